@@ -1,0 +1,1 @@
+"""Typed, bounded sections of scenario, robot and gain files."""
