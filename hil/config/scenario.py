@@ -1,0 +1,77 @@
+"""The scenario: everything a run needs to know, in one validated tree."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from hil.config.base import Section
+from hil.config.camera import CameraConfig
+from hil.config.control import ControlConfig
+from hil.config.events import Disturbance, Fault
+from hil.config.link import LinkConfig
+from hil.config.robot import RobotConfig
+from hil.references import Reference
+
+Side = Literal["left", "right"]
+
+
+class StartPose(Section):
+    """Where the robot stands, at rest, when the run begins (world frame, centre of mass)."""
+
+    x_m: float = Field(ge=-50, le=50, description="world X of the centre of mass")
+    y_m: float = Field(ge=-50, le=50, description="world Y of the centre of mass")
+    theta_rad: float = Field(ge=-7, le=7, description="heading, counter-clockwise from world +X")
+
+
+class Requirement(Section):
+    """One figure of the run that must hold; the verdict is pass when min <= value <= max."""
+
+    metric: str = Field(description="name of a figure of metrics.json")
+    min: float | None = Field(None, description="lowest value that holds, in the figure's unit")
+    max: float | None = Field(None, description="highest value that holds, in the figure's unit")
+
+
+class Manoeuvre(Section):
+    """What the experiment is about: the side the robot starts on and the way it must turn."""
+
+    start_side: Side = Field(description="side of the reference point on which the robot starts")
+    turn: Side = Field(description="way in which the heading must have turned at the end")
+
+
+class SafetyConfig(Section):
+    """When the host stops the robot by itself."""
+
+    pose_lost_s: float = Field(0.7, gt=0, le=10, description="no accepted pose for this long")
+    link_lost_s: float = Field(0.5, gt=0, le=10, description="no wheel report for this long")
+    fence_x_min_m: float = Field(-1.0, description="geofence of the centre of mass, world X")
+    fence_x_max_m: float = Field(1.0, description="geofence of the centre of mass, world X")
+    fence_y_min_m: float = Field(-0.75, description="geofence of the centre of mass, world Y")
+    fence_y_max_m: float = Field(0.75, description="geofence of the centre of mass, world Y")
+
+
+class Scenario(Section):
+    """One experiment: the same tree runs on every target."""
+
+    name: str = Field(min_length=1, max_length=80)
+    description: str = ""
+    duration_s: float = Field(gt=0, le=3600, description="length of the controlled part")
+    start: StartPose
+    reference: Annotated[Reference, Field(discriminator="kind")]
+    manoeuvre: Manoeuvre | None = None
+    requirements: tuple[Requirement, ...] = ()
+    robot: RobotConfig
+    mismatch: dict[str, float] = Field(
+        default_factory=dict,
+        description="true value / believed value by dotted robot key; simulated robots only",
+    )
+    board: dict[str, float] = Field(
+        default_factory=dict, description="board parameters that differ from their defaults"
+    )
+    camera: CameraConfig
+    link: LinkConfig
+    control: ControlConfig
+    safety: SafetyConfig = SafetyConfig()
+    disturbances: tuple[Disturbance, ...] = ()
+    faults: tuple[Fault, ...] = ()
