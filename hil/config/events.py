@@ -1,0 +1,102 @@
+"""Disturbances and faults: timed, seeded scenario data. Times count from the start of the run."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from hil.config.base import Section
+
+# On what a disturbance acts; the name ends in the unit of its amplitude.
+# eta2_dot under the operative constraint acts as theta_ddot = -eta2_dot / d0 (2.31).
+Target = Literal[
+    "eta1_dot_m_s2",  # body forward acceleration
+    "eta2_dot_m_s2",  # lateral acceleration (2.34)
+    "theta_ddot_rad_s2",  # yaw acceleration
+    "force_forward_n",  # push along body x
+    "force_left_n",  # push along body y
+    "torque_yaw_n_m",  # twist about the vertical
+    "load_left_n_m",  # brake torque on the left wheels, positive opposes forward
+    "load_right_n_m",  # brake torque on the right wheels, positive opposes forward
+    "slope_x_rad",  # floor rises along world X
+    "slope_y_rad",  # floor rises along world Y
+    "friction_change_ratio",  # added to 1, scales rolling and sliding friction
+    "battery_sag_v",  # taken off the battery voltage
+]
+Shape = Literal["sine", "step", "pulse", "noise"]
+FaultKind = Literal[
+    "dead_encoder",  # both channels of one side stay as they are
+    "dead_channel_a",
+    "dead_channel_b",
+    "swapped_phases",  # A and B exchanged: counts run backward
+    "motor_reversed",  # polarity of one side's motors
+    "motor_stuck",  # one side's gears jam
+    "board_reset",  # board held in reset from start to end, then boots anew
+    "link_cut",  # nothing passes either way
+    "camera_stall",  # no frames
+    "camera_occluded",  # robot hidden from the camera
+    "marks_swapped",  # front and rear colour marks exchanged
+]
+SIDED = {
+    "dead_encoder",
+    "dead_channel_a",
+    "dead_channel_b",
+    "swapped_phases",
+    "motor_reversed",
+    "motor_stuck",
+}
+
+
+class Disturbance(Section):
+    """One disturbance in force from `start_s` to `end_s`.
+
+    sine: amplitude sin(2 pi frequency (t - start) + phase); step: amplitude; pulse: half a sine
+    from start to end; noise: seeded, standard deviation `amplitude`, band up to `frequency_hz`.
+    """
+
+    target: Target
+    shape: Shape
+    amplitude: float = Field(ge=-1000, le=1000, description="in the unit the target's name ends in")
+    start_s: float = Field(0.0, ge=0, le=3600)
+    end_s: float | None = Field(None, gt=0, le=3600, description="None: to the end of the run")
+    frequency_hz: float = Field(0.5, gt=0, le=200, description="of the sine, or top of the noise")
+    phase_rad: float = Field(0.0, ge=-7, le=7, description="of the sine")
+    seed: int = Field(1, ge=0, le=2**31 - 1, description="of the noise, with the seed of the run")
+
+    @model_validator(mode="after")
+    def _ends_after_start(self) -> Self:
+        _check_times(self.start_s, self.end_s)
+        if self.shape == "pulse" and self.end_s is None:
+            raise ValueError("a pulse needs end_s")
+        return self
+
+
+class FloorPatch(Section):
+    """A round patch of floor with other friction."""
+
+    x_m: float = Field(ge=-50, le=50)
+    y_m: float = Field(ge=-50, le=50)
+    radius_m: float = Field(gt=0, le=50)
+    friction_ratio: float = Field(ge=0, le=10, description="friction on the patch over that beside")
+
+
+class Fault(Section):
+    """One fault in force from `start_s` to `end_s`."""
+
+    kind: FaultKind
+    side: Literal["left", "right", "both"] = Field("both", description="of encoders and motors")
+    start_s: float = Field(0.0, ge=0, le=3600)
+    end_s: float | None = Field(None, gt=0, le=3600, description="None: to the end of the run")
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Self:
+        _check_times(self.start_s, self.end_s)
+        if self.kind not in SIDED and self.side != "both":
+            raise ValueError(f"side: {self.kind} has no side")
+        return self
+
+
+def _check_times(start_s: float, end_s: float | None) -> None:
+    if end_s is not None and end_s <= start_s:
+        raise ValueError(f"end_s must be after start_s = {start_s} s")
