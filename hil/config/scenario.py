@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field
 
 from hil.config.base import Section
 from hil.config.camera import CameraConfig
-from hil.config.control import ControlConfig
+from hil.config.control import ControlConfig, ReferenceConfig
 from hil.config.events import Disturbance, Fault
 from hil.config.link import LinkConfig
 from hil.config.robot import RobotConfig
-from hil.references import Reference
 
 Side = Literal["left", "right"]
 
@@ -58,7 +57,7 @@ class Scenario(Section):
     description: str = ""
     duration_s: float = Field(gt=0, le=3600, description="length of the controlled part")
     start: StartPose
-    reference: Annotated[Reference, Field(discriminator="kind")]
+    reference: ReferenceConfig
     manoeuvre: Manoeuvre | None = None
     requirements: tuple[Requirement, ...] = ()
     robot: RobotConfig
