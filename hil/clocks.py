@@ -1,0 +1,238 @@
+"""The one place where board time and camera time become host time.
+
+Three clocks: `t_host_s` (monotonic, this machine), `t_mcu_us` (board, uint32, wraps after 71.6
+minutes) and `t_cam_s` (stamps of the camera). Nothing here reads a clock: times are arguments,
+so a replay of the same exchanges gives the same ties bit for bit.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left, insort
+from collections import deque
+from dataclasses import dataclass
+
+_WRAP_US = 1 << 32
+_HALF_WRAP_US = 1 << 31
+
+# Prior on the rate of the board's clock: a ceramic resonator is good to 0.5 % (5,000 ppm).
+_DRIFT_PRIOR_RATIO = 5e-3
+# Resolution below which nothing is claimed: the board may stamp in 4 us, the host in polls.
+_FLOOR_S = 50e-6
+
+
+@dataclass(frozen=True, slots=True)
+class _Exchange:
+    """One TIMESYNC round: unwrapped board time at half way, host time there, round trip."""
+
+    t_mcu_us: int
+    t_mid_s: float
+    rtt_s: float
+
+
+class BoardClock:
+    """Ties `t_mcu_us` to `t_host_s` by a regression over the last TIMESYNC exchanges.
+
+    Model of one exchange with round trip e above the shortest one:
+
+        middle = offset + (1 + drift) t_board + asymmetry e / 2,    -1 <= asymmetry <= 1
+
+    so the jitter's split between the two ways is fitted instead of assumed. The outlier gate
+    takes exchanges up to four times the median excess; those above `rtt_limit_s` are refused.
+    `sigma_s` is the standard error of the tie under equal *shortest* latency both ways;
+    `bound_s`, half the shortest round trip, holds whatever that asymmetry is.
+    """
+
+    def __init__(self, window: int = 64, rtt_limit_s: float = 0.5) -> None:
+        self._window: deque[_Exchange] = deque(maxlen=window)
+        self._rtt_limit_s = rtt_limit_s
+        self._last_us = 0
+        self.refused = 0
+        self.restarts = 0
+        self._forget()
+
+    def _forget(self) -> None:
+        self._window.clear()
+        self._ref_us = 0
+        self._ref_s = 0.0
+        self._rate = 1e-6
+        self._mean_us = 0
+        self._var_s2 = math.inf
+        self._var_drift = _DRIFT_PRIOR_RATIO**2
+        self.rtt_s = math.nan
+        self.bound_s = math.inf
+
+    @property
+    def ready(self) -> bool:
+        """True once an exchange has been taken."""
+        return bool(self._window)
+
+    @property
+    def drift_ratio(self) -> float:
+        """Rate of host time over board time, less one (+1e-4: the board is 100 ppm slow)."""
+        return self._rate * 1e6 - 1.0
+
+    @property
+    def sigma_s(self) -> float:
+        """Standard error in s of `to_host_s` for the newest board time seen; inf before a tie."""
+        return self._sigma_at(self._last_us)
+
+    def exchange(self, t_send_s: float, t_receive_s: float, t_mcu_us: int) -> bool:
+        """Take one exchange: host times of request and reply, board time stamped in between.
+
+        Returns False when it was refused (round trip outside 0 to the limit).
+        """
+        rtt_s = t_receive_s - t_send_s
+        if not 0.0 <= rtt_s <= self._rtt_limit_s:
+            self.refused += 1
+            return False
+        unwrapped_us = self._unwrap(t_mcu_us)
+        mid_s = 0.5 * (t_send_s + t_receive_s)
+        if self.ready and self._impossible(unwrapped_us, mid_s, rtt_s):
+            self._forget()  # the board's clock jumped: it was reset
+            self.restarts += 1
+        self._last_us = max(self._last_us, unwrapped_us) if self.ready else unwrapped_us
+        self._window.append(_Exchange(unwrapped_us, mid_s, rtt_s))
+        self.rtt_s = rtt_s
+        self._fit()
+        return True
+
+    def to_host_s(self, t_mcu_us: int) -> float:
+        """Return the host time of a board stamp no further than 35 minutes from the newest one."""
+        unwrapped_us = self._unwrap(t_mcu_us)
+        self._last_us = max(self._last_us, unwrapped_us)
+        return self._ref_s + (unwrapped_us - self._ref_us) * self._rate
+
+    def _unwrap(self, t_mcu_us: int) -> int:
+        ahead_us = (t_mcu_us - self._last_us + _HALF_WRAP_US) % _WRAP_US - _HALF_WRAP_US
+        return self._last_us + ahead_us
+
+    def _sigma_at(self, unwrapped_us: int) -> float:
+        lead_s = (unwrapped_us - self._mean_us) * 1e-6
+        return math.sqrt(self._var_s2 + self._var_drift * lead_s * lead_s)
+
+    def _impossible(self, unwrapped_us: int, mid_s: float, rtt_s: float) -> bool:
+        """True when the stamp lies outside its own exchange by more than the tie's uncertainty."""
+        predicted_s = self._ref_s + (unwrapped_us - self._ref_us) * self._rate
+        margin_s = 6.0 * self._sigma_at(unwrapped_us)
+        return abs(predicted_s - mid_s) > 0.5 * rtt_s + self.bound_s + margin_s
+
+    def _gated(self, shortest_s: float) -> list[_Exchange]:
+        """Return the exchanges whose excess is at most four times the median excess."""
+        rtts_s = sorted(x.rtt_s for x in self._window)
+        limit_s = shortest_s + 4.0 * (rtts_s[(len(rtts_s) - 1) // 2] - shortest_s)
+        return [x for x in self._window if x.rtt_s <= limit_s]
+
+    def _fit(self) -> None:
+        """Least squares for offset, drift and asymmetry; the last two are held by priors."""
+        rtts_s = [x.rtt_s for x in self._window]
+        shortest_s = min(rtts_s)
+        # The shortest of n round trips is itself above the true floor by about spread/(n+1).
+        spread_s = max(max(rtts_s) - shortest_s, shortest_s) / (len(rtts_s) + 1)
+        ref = self._window[-1]
+        points = [
+            (
+                (x.t_mcu_us - ref.t_mcu_us) * 1e-6,
+                0.5 * (x.rtt_s - shortest_s),
+                x.t_mid_s - ref.t_mid_s - (x.t_mcu_us - ref.t_mcu_us) * 1e-6,
+            )
+            for x in self._gated(shortest_s)
+        ]
+        fit = _regress(points, 0.5 * min(spread_s, shortest_s))
+        self._ref_us = ref.t_mcu_us
+        self._ref_s = ref.t_mid_s + fit.lag_s
+        self._rate = (1.0 + fit.drift) * 1e-6
+        self._mean_us = ref.t_mcu_us + round(fit.mean_t_s * 1e6)
+        self._var_s2, self._var_drift = fit.var_s2, fit.var_drift
+        self.bound_s = 0.5 * shortest_s
+
+
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """Lag at t = 0 and its variance at `mean_t_s`, drift and its variance."""
+
+    lag_s: float
+    drift: float
+    mean_t_s: float
+    var_s2: float
+    var_drift: float
+
+
+def _regress(points: list[tuple[float, float, float]], unseen_s: float) -> _Fit:
+    """Fit lag = offset + drift t + asymmetry excess to (t, excess, lag) in s.
+
+    `unseen_s` is how far the smallest excess may itself be off. Priors: drift 0 +- 5,000 ppm,
+    asymmetry uniform in -1..1 (variance 1/3).
+    """
+    n = len(points)
+    mean_t, mean_e, mean_y = (sum(p[i] for p in points) / n for i in range(3))
+    # An excess e split at random between the two ways puts the middle off by e/2 uniformly.
+    noise = sum(e * e for _, e, _ in points) / (3.0 * n) + unseen_s**2 + _FLOOR_S**2
+    tt, ee, te, ty, ey = noise * _DRIFT_PRIOR_RATIO**-2, 3.0 * noise, 0.0, 0.0, 0.0
+    for t, e, y in points:
+        dt, de, dy = t - mean_t, e - mean_e, y - mean_y
+        tt += dt * dt
+        ee += de * de
+        te += dt * de
+        ty += dt * dy
+        ey += de * dy
+    det = tt * ee - te * te
+    drift = (ty * ee - ey * te) / det
+    asymmetry = (ey * tt - ty * te) / det
+    residual = sum(
+        (y - mean_y - drift * (t - mean_t) - asymmetry * (e - mean_e)) ** 2 for t, e, y in points
+    )
+    # Four pseudo-observations of the assumed noise keep a lucky handful of points modest.
+    noise = (residual + 4.0 * noise) / (n + 2.0)
+    return _Fit(
+        lag_s=mean_y - drift * mean_t - asymmetry * mean_e,
+        drift=drift,
+        mean_t_s=mean_t,
+        var_s2=noise / n + noise * tt / det * mean_e**2 + unseen_s**2 / 3.0,
+        var_drift=noise * ee / det,
+    )
+
+
+class CameraClock:
+    """Ties the camera's stamps to host time from when the frames arrive.
+
+    arrival = exposure + latency + jitter, so host time of a stamp is the stamp plus the median of
+    (arrival - stamp) over the last frames, less the calibrated median latency. The median is
+    blind to frames held up by a busy host or radio; its window bounds the lag behind a drift.
+    """
+
+    def __init__(self, latency_s: float, window: int = 301) -> None:
+        self._latency_s = latency_s
+        self._window = window
+        self._gaps_s: deque[float] = deque()
+        self._sorted_s: list[float] = []
+
+    @property
+    def ready(self) -> bool:
+        """True once a frame has been seen."""
+        return bool(self._gaps_s)
+
+    @property
+    def sigma_s(self) -> float:
+        """Standard error in s of the tie, from the scatter of arrivals; inf below two frames."""
+        count = len(self._sorted_s)
+        if count < 2:
+            return math.inf
+        # Half the inter-quartile range over 0.674 is sigma of a normal scatter; the median of n
+        # has 1.253 times the standard error of a mean.
+        quartiles_s = self._sorted_s[(3 * count) // 4] - self._sorted_s[count // 4]
+        return 1.253 * quartiles_s / (2.0 * 0.674) / math.sqrt(count)
+
+    def arrival(self, t_cam_s: float, t_host_s: float) -> None:
+        """Take a frame stamped `t_cam_s` (middle of exposure) that reached the host at `t_host_s`."""
+        gap_s = t_host_s - t_cam_s
+        self._gaps_s.append(gap_s)
+        insort(self._sorted_s, gap_s)
+        if len(self._gaps_s) > self._window:
+            del self._sorted_s[bisect_left(self._sorted_s, self._gaps_s.popleft())]
+
+    def to_host_s(self, t_cam_s: float) -> float:
+        """Return the host time of the exposure stamped `t_cam_s`; needs one arrival first."""
+        count = len(self._sorted_s)
+        median_s = 0.5 * (self._sorted_s[(count - 1) // 2] + self._sorted_s[count // 2])
+        return t_cam_s + median_s - self._latency_s
