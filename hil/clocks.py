@@ -112,7 +112,7 @@ class BoardClock:
         return math.sqrt(self._var_s2 + self._var_drift * lead_s * lead_s)
 
     def _impossible(self, unwrapped_us: int, mid_s: float, rtt_s: float) -> bool:
-        """True when the stamp lies outside its own exchange by more than the tie's uncertainty."""
+        """Tell whether the stamp lies outside its exchange by more than the tie allows."""
         predicted_s = self._ref_s + (unwrapped_us - self._ref_us) * self._rate
         margin_s = 6.0 * self._sigma_at(unwrapped_us)
         return abs(predicted_s - mid_s) > 0.5 * rtt_s + self.bound_s + margin_s
@@ -224,7 +224,7 @@ class CameraClock:
         return 1.253 * quartiles_s / (2.0 * 0.674) / math.sqrt(count)
 
     def arrival(self, t_cam_s: float, t_host_s: float) -> None:
-        """Take a frame stamped `t_cam_s` (middle of exposure) that reached the host at `t_host_s`."""
+        """Take a frame stamped `t_cam_s` (mid exposure) that reached the host at `t_host_s`."""
         gap_s = t_host_s - t_cam_s
         self._gaps_s.append(gap_s)
         insort(self._sorted_s, gap_s)

@@ -1,0 +1,236 @@
+"""Where camera frames come from on a rig in real time: a camera, a video file, or a served twin.
+
+A source has a thread that fills a short queue and a file descriptor that becomes readable then,
+so that one select covers port and camera.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import socket
+import threading
+import time
+from collections import deque
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from hil.errors import BadInput, RigFault
+from hil.targets.base import Frame
+from hil.types import Pose, PoseMeasurement
+
+TWIN_PREFIX = "twin:"
+# A host that falls behind wants the newest frames; older ones are as good as dropped.
+_QUEUE_LENGTH = 4
+
+
+class FrameSource(Protocol):
+    """Camera frames as they arrive, in real time."""
+
+    def fileno(self) -> int:
+        """Return a descriptor that is readable while a frame is waiting."""
+
+    def poll(self) -> Frame | None:
+        """Return the oldest frame waiting, None if there is none; raises RigFault at the end."""
+
+    def close(self) -> None:
+        """Release the camera; safe to call twice."""
+
+
+def open_source(text: str) -> FrameSource:
+    """Return the source that `--camera` names: INDEX, FILE or twin:SOCKET. Raises RigFault."""
+    if text.startswith(TWIN_PREFIX):
+        return SocketSource(text.removeprefix(TWIN_PREFIX))
+    if text.isdigit():
+        return CaptureSource(int(text))
+    if Path(text).is_file():
+        return CaptureSource(text)
+    raise BadInput(
+        f"camera {text!r}: neither a camera index, a video file nor twin:SOCKET; "
+        "`hil doctor` lists the cameras"
+    )
+
+
+class _Queue:
+    """Frames from one thread to another, with a pipe that is readable while some are waiting."""
+
+    def __init__(self) -> None:
+        self._frames: deque[Frame] = deque(maxlen=_QUEUE_LENGTH)
+        self._fault = ""
+        self._reader, self._writer = os.pipe()
+        os.set_blocking(self._reader, False)
+        os.set_blocking(self._writer, False)
+        self._lock = threading.Lock()
+
+    def fileno(self) -> int:
+        return self._reader
+
+    def put(self, frame: Frame) -> None:
+        with self._lock:
+            self._frames.append(frame)
+            self._wake()
+
+    def fail(self, reason: str) -> None:
+        with self._lock:
+            self._fault = reason
+            self._wake()
+
+    def _wake(self) -> None:
+        # A full pipe is readable already; a closed one has nobody waiting.
+        with contextlib.suppress(OSError):
+            os.write(self._writer, b".")
+
+    def poll(self) -> Frame | None:
+        with self._lock:
+            if self._frames:
+                frame = self._frames.popleft()
+                if not self._frames and not self._fault:
+                    self._drain()
+                return frame
+            if self._fault:
+                raise RigFault(self._fault)
+            return None
+
+    def _drain(self) -> None:
+        with contextlib.suppress(BlockingIOError):
+            os.read(self._reader, 4096)
+
+    def close(self) -> None:
+        with self._lock:
+            for descriptor in (self._reader, self._writer):
+                if descriptor >= 0:
+                    os.close(descriptor)
+            self._reader = self._writer = -1
+
+
+class CaptureSource:
+    """A camera or a video file through OpenCV; a file is played at its own rate.
+
+    `t_cam_s` is the driver's stamp where it gives one, else the arrival. What lies between the
+    middle of the exposure and that stamp is part of the calibrated latency.
+    """
+
+    def __init__(self, device: int | str) -> None:
+        import cv2  # noqa: PLC0415 - most runs have no camera and need not load the drivers
+
+        self._name = f"camera {device}"
+        self._capture = cv2.VideoCapture(device)
+        if not self._capture.isOpened():
+            raise RigFault(f"{self._name}: cannot be opened; `hil doctor` lists the cameras")
+        self._is_file = isinstance(device, str)
+        self._stamp_property = cv2.CAP_PROP_POS_MSEC
+        self._queue = _Queue()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        start_s = time.monotonic()
+        index = 0
+        while not self._stop.is_set():
+            stamp_ok, image = self._capture.read()
+            if not stamp_ok or image is None:
+                end = "end of file" if self._is_file else "gives no more frames; is it unplugged?"
+                self._queue.fail(f"{self._name}: {end} after {index} frames")
+                return
+            arrival_s = time.monotonic()
+            stamp_s = self._capture.get(self._stamp_property) * 1e-3
+            if self._is_file:
+                self._stop.wait(start_s + stamp_s - arrival_s)
+            elif stamp_s <= 0.0:
+                stamp_s = arrival_s
+            self._queue.put(Frame(index, stamp_s, np.asarray(image, np.uint8)))
+            index += 1
+
+    def fileno(self) -> int:
+        """Return a descriptor that is readable while a frame is waiting."""
+        return self._queue.fileno()
+
+    def poll(self) -> Frame | None:
+        """Return the oldest frame waiting; raises RigFault when the camera is gone."""
+        return self._queue.poll()
+
+    def close(self) -> None:
+        """Stop the thread and release the camera."""
+        self._stop.set()
+        self._thread.join(timeout=2.0)
+        self._capture.release()
+        self._queue.close()
+
+
+def encode_frame(frame: Frame) -> bytes:
+    """Return a frame for the socket: one line of JSON, then the image's bytes, row by row."""
+    head: dict[str, Any] = {"index": frame.index, "t_cam_s": frame.t_cam_s}
+    body = b""
+    if frame.image is not None:
+        head["shape"] = list(frame.image.shape)
+        body = frame.image.tobytes()
+    if frame.pose is not None:
+        head["pose"] = asdict(frame.pose)
+    return json.dumps(head).encode() + b"\n" + body
+
+
+def _decode_head(line: bytes) -> tuple[dict[str, Any], int]:
+    """Return the header and the number of image bytes that follow it."""
+    head = json.loads(line)
+    shape = head.get("shape")
+    return head, shape[0] * shape[1] * shape[2] if shape else 0
+
+
+def _decode_frame(head: dict[str, Any], body: bytes) -> Frame:
+    image = np.frombuffer(body, np.uint8).reshape(head["shape"]) if body else None
+    measurement = None
+    if "pose" in head:
+        fields = dict(head["pose"])
+        pose = fields.pop("pose")
+        measurement = PoseMeasurement(pose=Pose(**pose) if pose else None, **fields)
+    return Frame(head["index"], head["t_cam_s"], image, measurement)
+
+
+class SocketSource:
+    """The frames of a served twin, from its Unix socket."""
+
+    def __init__(self, path: str) -> None:
+        self._name = f"camera {TWIN_PREFIX}{path}"
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            self._socket.connect(path)
+        except OSError as error:
+            self._socket.close()
+            raise RigFault(
+                f"{self._name}: {error.strerror}; start `hil twin serve` first"
+            ) from None
+        self._queue = _Queue()
+        self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        with self._socket.makefile("rb") as stream:
+            try:
+                while line := stream.readline():
+                    head, length = _decode_head(line)
+                    self._queue.put(_decode_frame(head, stream.read(length)))
+            except (OSError, ValueError) as error:
+                self._queue.fail(f"{self._name}: {error}")
+                return
+        self._queue.fail(f"{self._name}: the twin closed the socket")
+
+    def fileno(self) -> int:
+        """Return a descriptor that is readable while a frame is waiting."""
+        return self._queue.fileno()
+
+    def poll(self) -> Frame | None:
+        """Return the oldest frame waiting; raises RigFault when the twin is gone."""
+        return self._queue.poll()
+
+    def close(self) -> None:
+        """Close the socket and end the thread."""
+        with contextlib.suppress(OSError):  # the twin may have closed it first
+            self._socket.shutdown(socket.SHUT_RDWR)
+        self._socket.close()
+        self._thread.join(timeout=2.0)
+        self._queue.close()
