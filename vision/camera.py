@@ -227,7 +227,8 @@ class CameraModel:
         undistort = np.array(
             [[yy / self.fx_px, -xy / self.fy_px], [-yx / self.fx_px, xx / self.fy_px]]
         )
-        return plane @ undistort / det
+        jacobian: Array = plane @ undistort / det
+        return jacobian
 
     def floor_covariance(
         self, u_px: float, v_px: float, height_m: float, sigma_px: float, sigma_height_m: float
@@ -235,7 +236,8 @@ class CameraModel:
         """Return the covariance of (X, Y), (2, 2), m^2, for pixel noise and an uncertain height."""
         jacobian = self.floor_jacobian(u_px, v_px, height_m)
         lean = np.array(self.lean(u_px, v_px))
-        return sigma_px**2 * jacobian @ jacobian.T + sigma_height_m**2 * np.outer(lean, lean)
+        noise: Array = sigma_px**2 * jacobian @ jacobian.T
+        return noise + sigma_height_m**2 * np.outer(lean, lean)
 
 
 def look_at(eye_m: ArrayLike, target_m: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.0)) -> Array:
@@ -253,5 +255,4 @@ def look_at(eye_m: ArrayLike, target_m: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.
     if np.linalg.norm(right) < 1e-6:
         right = np.cross(forward, (0.0, 1.0, 0.0))
     right /= np.linalg.norm(right)
-    down: Array = np.cross(forward, right)
-    return np.stack((right, down, forward), axis=1)
+    return np.stack((right, np.cross(forward, right), forward), axis=1)
