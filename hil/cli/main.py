@@ -15,7 +15,10 @@ from hil.errors import HilError
 # name -> (module, one-line help). The text stands here so that `hil --help` imports no command.
 COMMANDS = {
     "run": ("hil.cli.run", "Run one scenario on a target and record it."),
-    "experiment": ("hil.cli.experiment", "Run every scenario of a deck with both laws; one report."),
+    "experiment": (
+        "hil.cli.experiment",
+        "Run every scenario of a deck with both laws; one report.",
+    ),
     "compare": ("hil.cli.compare", "Compare recorded runs: table, JSON and HTML report."),
     "view": ("hil.cli.view", "Open recorded runs in the viewer."),
     "tune": ("hil.cli.tune", "Tune the gains of both laws by one procedure and budget."),

@@ -39,7 +39,7 @@ def unit_of(key: str) -> str:
 
 
 def builtin_names(kind: str) -> list[str]:
-    """Return the names of the built-in files of one kind: "scenarios", "robots" or "decks"."""
+    """Return the names of the built-in files of one kind: "scenarios", "labs" or "robots"."""
     folder = files("hil") / "data" / kind
     return sorted(item.name[:-5] for item in folder.iterdir() if item.name.endswith(".toml"))
 
@@ -69,7 +69,7 @@ def read_tree(name_or_path: str, kind: str) -> Tree:
         raise BadInput(f"{where}: not valid TOML: {error}") from None
     base = tree.pop("base", None)
     if base is not None:
-        tree = merge(read_tree(_beside(folder, str(base)), kind), tree)
+        tree = merge(read_tree(_beside(folder, str(base)), "labs"), tree)
     if isinstance(tree.get("robot"), Mapping) and "file" in tree["robot"]:
         own = dict(tree["robot"])
         robot_tree = read_tree(_beside(folder, str(own.pop("file"))), "robots")
@@ -144,7 +144,7 @@ def _find(tree: Tree, key: str) -> tuple[Any, Any]:
     for depth, part in enumerate(parts):
         index: Any = int(part) if isinstance(node, list) and part.isdigit() else part
         last = depth == len(parts) - 1
-        if isinstance(node, dict) and (index in node or (last and node.get("__free__"))):
+        if isinstance(node, dict) and index in node:
             pass
         elif not (isinstance(node, list) and isinstance(index, int) and index < len(node)):
             return None, None
@@ -185,63 +185,33 @@ def build(model: type[Model], tree: Tree, where: str) -> Model:
 
 
 def _explain(error: ValidationError, tree: Tree) -> str:
-    """Return key, value with unit, limit and, for an unknown key, near names."""
+    """Return key, value with unit, and limit of the first violation."""
     first = error.errors(include_url=False)[0]
-    path = [str(part) for part in first["loc"]]
-    key = ".".join(path)
-    if first["type"] == "extra_forbidden":
-        siblings = _siblings(tree, path, error)
-        near = difflib.get_close_matches(path[-1], siblings, n=3, cutoff=0.5)
-        hint = f"near: {', '.join(near)}" if near else f"known here: {', '.join(siblings)}"
-        return f"{key}: unknown key; {hint}"
+    key = _key(first["loc"], tree)
+    said = first["msg"].removeprefix("Value error, ")
+    limit = said[:1].lower() + said[1:]
     if first["type"] == "missing":
         return f"{key}: missing; give a value"
-    unit = unit_of(path[-1]) if path else ""
     value = first["input"]
-    shown = f"{value!r} {unit}".strip() if not isinstance(value, dict | list) else "this table"
-    limit = first["msg"].removeprefix("Value error, ")
-    limit = limit[:1].lower() + limit[1:]
-    if first["type"] in {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}:
-        limit = f"{limit} {unit}".strip()
     more = error.error_count() - 1
     rest = f" (and {more} more)" if more else ""
-    return f"{key} = {shown}: {limit}{rest}"
+    if isinstance(value, dict | list):
+        return f"{key}: {limit}{rest}" if key else f"{limit}{rest}"
+    unit = unit_of(key)
+    if first["type"].startswith(("greater_than", "less_than")):
+        limit = f"{limit} {unit}".strip()
+    return f"{key} = {f'{value!r} {unit}'.strip()}: {limit}{rest}"
 
 
-def _siblings(tree: Tree, path: list[str], error: ValidationError) -> list[str]:
-    """Return the field names that the table holding an unknown key may have."""
-    model: Any = Scenario if error.title == "Scenario" else None
+def _key(loc: tuple[int | str, ...], tree: Tree) -> str:
+    """Return the dotted name of a violation, without the union tags that the file does not have."""
+    parts: list[str] = []
     node: Any = tree
-    for part in path[:-1]:
-        node = node[int(part)] if isinstance(node, list) and part.isdigit() else _get(node, part)
-        model = _field_model(model, part, node)
-    return sorted(model.model_fields) if model is not None else []
-
-
-def _get(node: Any, part: str) -> Any:
-    return node.get(part, node) if isinstance(node, dict) else node
-
-
-def _field_model(model: Any, part: str, node: Any) -> Any:
-    """Return the section class behind field `part`, looking through lists and unions by kind."""
-    if model is None:
-        return None
-    field = model.model_fields.get(part)
-    if field is None:
-        return model
-    candidates = _models_in(field.annotation)
-    kind = node.get("kind") if isinstance(node, dict) else None
-    for candidate in candidates:
-        default = candidate.model_fields["kind"].default if "kind" in candidate.model_fields else None
-        if kind is not None and default == kind:
-            return candidate
-    return candidates[0] if candidates else None
-
-
-def _models_in(annotation: Any) -> list[Any]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    found: list[Any] = []
-    for argument in getattr(annotation, "__args__", ()):
-        found += _models_in(argument)
-    return found
+    for part in loc:
+        if isinstance(node, dict) and part not in node and node.get("kind") == part:
+            continue
+        parts.append(str(part))
+        inside = isinstance(node, dict) and part in node
+        inside = inside or (isinstance(node, list) and isinstance(part, int) and part < len(node))
+        node = node[part] if inside else None
+    return ".".join(parts)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import Field
 
 from hil.config.base import Section
@@ -12,8 +10,6 @@ from hil.config.control import ControlConfig, ReferenceConfig
 from hil.config.events import Disturbance, Fault
 from hil.config.link import LinkConfig
 from hil.config.robot import RobotConfig
-
-Side = Literal["left", "right"]
 
 
 class StartPose(Section):
@@ -30,13 +26,6 @@ class Requirement(Section):
     metric: str = Field(description="name of a figure of metrics.json")
     min: float | None = Field(None, description="lowest value that holds, in the figure's unit")
     max: float | None = Field(None, description="highest value that holds, in the figure's unit")
-
-
-class Manoeuvre(Section):
-    """What the experiment is about: the side the robot starts on and the way it must turn."""
-
-    start_side: Side = Field(description="side of the reference point on which the robot starts")
-    turn: Side = Field(description="way in which the heading must have turned at the end")
 
 
 class SafetyConfig(Section):
@@ -58,7 +47,6 @@ class Scenario(Section):
     duration_s: float = Field(gt=0, le=3600, description="length of the controlled part")
     start: StartPose
     reference: ReferenceConfig
-    manoeuvre: Manoeuvre | None = None
     requirements: tuple[Requirement, ...] = ()
     robot: RobotConfig
     mismatch: dict[str, float] = Field(
