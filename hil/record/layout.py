@@ -1,0 +1,13 @@
+"""Names of the files of a run record."""
+
+MANIFEST = "manifest.json"
+SAMPLES = "samples.parquet"
+SAMPLES_JOURNAL = "samples.journal"
+FRAMES = "frames.parquet"
+FRAMES_JOURNAL = "frames.journal"
+LINK = "link.tlog"
+EVENTS = "events.jsonl"
+CAMERA = "camera.mkv"
+RERUN = "run.rrd"
+FIGURES = "metrics.json"
+PICTURES = "pictures"

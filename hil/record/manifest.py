@@ -1,0 +1,150 @@
+"""`manifest.json`: what made a run, so that the record is evidence by itself."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from hil.errors import BadInput
+from hil.record import layout
+from hil.record.schema import SCHEMA_VERSION
+
+Outcome = Literal["running", "complete", "interrupted", "fault"]
+_PACKAGES = ("skid-steer-hil", "numpy", "opencv-python-headless", "pymavlink", "pyarrow", "scipy")
+
+
+class FileEntry(BaseModel):
+    """One finished file of the record."""
+
+    model_config = ConfigDict(frozen=True)
+
+    bytes: int
+    sha256: str
+
+
+class Manifest(BaseModel):
+    """Everything that decides a run's result, and how the run ended.
+
+    Unknown keys are kept: a later version may add some without a new schema version.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+
+    schema_version: int = SCHEMA_VERSION
+    outcome: Outcome = "running"
+    outcome_detail: str = ""
+    command: str = Field("", description="the command line that made the run")
+    scenario: dict[str, Any] = Field(description="the scenario with every resolved value")
+    seed: int
+    target: str
+    camera: str = Field(description="rendered, pose, a camera index or a file")
+    outer: str
+    inner: str
+    gains: dict[str, Any] = Field(default_factory=dict, description="gains of the laws in use")
+    versions: dict[str, str] = Field(default_factory=dict)
+    git_revision: str = ""
+    dialect_hash: str = ""
+    parameter_hash: str = ""
+    firmware_build_id: str = ""
+    start_time_utc: str = ""
+    start_unix_us: int = Field(0, description="wall time of t_s = 0; time base of link.tlog")
+    tick_count: int = 0
+    link: dict[str, float] = Field(default_factory=dict, description="counters of the host link")
+    files: dict[str, FileEntry] = Field(default_factory=dict)
+
+    @property
+    def scenario_name(self) -> str:
+        """Return the scenario's own name."""
+        return str(self.scenario.get("name", ""))
+
+
+def write_manifest(folder: Path, manifest: Manifest) -> None:
+    """Write the manifest atomically: a reader sees the old one or the new one, whole."""
+    text = json.dumps(manifest.model_dump(mode="json"), indent=1, ensure_ascii=False)
+    replace_file(folder / layout.MANIFEST, text.encode() + b"\n")
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Return a record's manifest; raises BadInput when the folder is not a readable run record."""
+    path = folder / layout.MANIFEST
+    if not folder.is_dir():
+        raise BadInput(f"{folder}: no such folder; give the folder of a run record")
+    if not path.is_file():
+        raise BadInput(f"{folder}: not a run record ({layout.MANIFEST} is missing)")
+    try:
+        tree = json.loads(path.read_bytes())
+    except (OSError, ValueError) as error:
+        raise BadInput(f"{path}: damaged, not readable as JSON: {error}") from None
+    found = tree.get("schema_version") if isinstance(tree, Mapping) else None
+    if not isinstance(found, int):
+        raise BadInput(f"{path}: not the manifest of a run record (schema_version is missing)")
+    if found > SCHEMA_VERSION:
+        raise BadInput(
+            f"{path}: schema_version = {found}, this program reads up to {SCHEMA_VERSION}; "
+            "update skid-steer-hil"
+        )
+    try:
+        return Manifest.model_validate(tree)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise BadInput(f"{path}: damaged: {key}: {first['msg'].lower()}") from None
+
+
+def replace_file(path: Path, data: bytes) -> None:
+    """Put `data` at `path` in one step, so that no reader and no crash sees half of it."""
+    part = path.with_name(f"{path.name}.part")
+    with part.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+    part.replace(path)
+
+
+def file_entry(path: Path) -> FileEntry:
+    """Return size and SHA-256 of a file."""
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    return FileEntry(bytes=path.stat().st_size, sha256=digest)
+
+
+def collect_versions() -> dict[str, str]:
+    """Return the versions of the interpreter and of the packages that decide a run's numbers."""
+    found = {"python": platform.python_version(), "platform": platform.platform(terse=True)}
+    for package in _PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed as a package"
+    return found
+
+
+@functools.cache
+def git_revision() -> str:
+    """Return the commit of the source tree, "+changes" when edited; "" outside a checkout."""
+    root = Path(__file__).resolve().parents[2]
+    if not (root / ".git").exists():
+        return ""
+    command = ["git", "-C", str(root), "describe", "--always", "--abbrev=40", "--dirty=+changes"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=5, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return done.stdout.strip()
+
+
+def command_line() -> str:
+    """Return the command that started this process, as a person would type it."""
+    words = [Path(sys.argv[0]).name, *sys.argv[1:]]
+    return " ".join(f"'{word}'" if " " in word else word for word in words)

@@ -1,0 +1,166 @@
+"""Reads a run record: a finished one, or one that was cut off in mid-run."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hil import metrics
+from hil.errors import BadInput
+from hil.record import layout
+from hil.record.journal import Columns, read_journal, read_parquet
+from hil.record.manifest import Manifest, file_entry, read_manifest
+from hil.record.schema import FRAME_NAMES, SAMPLE_NAMES
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened at `t_s`: arming, a stop, a fault, a text of the board."""
+
+    t_s: float
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """One camera image that was kept: host time of its arrival, and its JPEG file."""
+
+    t_s: float
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
+class RunRecord:
+    """A run in memory: float64 columns by name, NaN where a value does not exist.
+
+    `problems` says in one line each what is missing, cut off or altered; empty when all is well.
+    """
+
+    path: Path
+    manifest: Manifest
+    samples: Columns
+    frames: Columns
+    events: tuple[Event, ...] = ()
+    pictures: tuple[Picture, ...] = ()
+    problems: tuple[str, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """Return the name of the run for people: the outer law, then the folder."""
+        return f"{self.manifest.outer} ({self.path.name})"
+
+    def link_stats(self) -> metrics.LinkStats:
+        """Return the link counters kept in the manifest."""
+        names = metrics.LinkStats.__dataclass_fields__
+        known = {
+            name: int(self.manifest.link[name]) for name in names if name in self.manifest.link
+        }
+        return metrics.LinkStats(**known)
+
+    def figures(self) -> metrics.Figures:
+        """Return the figures, computed from the samples."""
+        return metrics.compute(self.samples, self.link_stats())
+
+    def verdicts(self) -> tuple[metrics.Verdict, ...]:
+        """Return the verdict on each requirement of the scenario."""
+        return metrics.check(self.figures(), self.manifest.scenario)
+
+    def moments(self) -> dict[str, Picture]:
+        """Return the picture at the start, at half of the way travelled, and at the end."""
+        if not self.pictures:
+            return {}
+        chosen = {"start": self.pictures[0]}
+        steps_m = np.hypot(np.diff(self.samples["est_x_m"]), np.diff(self.samples["est_y_m"]))
+        way_m = np.cumsum(np.nan_to_num(steps_m))
+        if way_m.size and len(self.pictures) > 2:
+            half_s = float(self.samples["t_s"][1:][np.searchsorted(way_m, way_m[-1] / 2)])
+            between = self.pictures[1:-1]
+            chosen["middle"] = min(between, key=lambda picture: abs(picture.t_s - half_s))
+        return chosen | {"end": self.pictures[-1]}
+
+
+def read_run(path: Path) -> RunRecord:
+    """Return the run recorded in folder `path`; what is intact is used, the rest is in `problems`.
+
+    Raises BadInput when the folder is not a run record, is of a newer schema, or has no readable
+    samples.
+    """
+    manifest = read_manifest(path)
+    problems: list[str] = []
+    if manifest.outcome == "running":
+        problems.append("cut off in mid-run: the record was never closed")
+    problems += altered_files(path, manifest)
+    samples = _table(path, layout.SAMPLES, layout.SAMPLES_JOURNAL, required=True)
+    missing = [name for name in SAMPLE_NAMES if name not in samples]
+    if missing:
+        raise BadInput(f"{path / layout.SAMPLES}: damaged: column {missing[0]} is missing")
+    frames = _table(path, layout.FRAMES, layout.FRAMES_JOURNAL, required=False)
+    return RunRecord(
+        path=path,
+        manifest=manifest,
+        samples=samples,
+        frames=frames if set(FRAME_NAMES) <= set(frames) else {},
+        events=read_events(path / layout.EVENTS),
+        pictures=read_pictures(path / layout.PICTURES),
+        problems=tuple(problems),
+    )
+
+
+def altered_files(path: Path, manifest: Manifest) -> list[str]:
+    """Return a line for each finished file that is missing or differs from its SHA-256."""
+    found = []
+    for name, entry in manifest.files.items():
+        file = path / name
+        if not file.is_file():
+            found.append(f"{name} is missing")
+        elif file.stat().st_size != entry.bytes:
+            found.append(f"{name} has {file.stat().st_size} bytes, the manifest says {entry.bytes}")
+        elif file_entry(file).sha256 != entry.sha256:
+            found.append(f"{name} was altered after the run: SHA-256 differs from the manifest")
+    return found
+
+
+def _table(path: Path, parquet: str, journal: str, *, required: bool) -> Columns:
+    if (path / parquet).is_file():
+        return read_parquet(path / parquet)
+    if (path / journal).is_file():
+        columns = read_journal(path / journal)
+        if columns or not required:
+            return columns
+        raise BadInput(f"{path / journal}: cut off before the first row")
+    if required:
+        raise BadInput(f"{path}: not a whole run record: neither {parquet} nor {journal} is there")
+    return {}
+
+
+def read_events(path: Path) -> tuple[Event, ...]:
+    """Return the events of whole lines; a torn last line is left."""
+    if not path.is_file():
+        return ()
+    events = []
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+        try:
+            tree = json.loads(line)
+            events.append(Event(float(tree["t_s"]), str(tree["kind"]), str(tree["text"])))
+        except (ValueError, KeyError, TypeError):
+            break
+    return tuple(events)
+
+
+def picture_name(t_s: float) -> str:
+    """Return the file name of the picture that arrived at `t_s`."""
+    return f"{t_s:08.3f}s.jpg"
+
+
+def read_pictures(folder: Path) -> tuple[Picture, ...]:
+    """Return the pictures of a record in time order."""
+    pictures = []
+    for file in folder.glob("*s.jpg"):
+        with contextlib.suppress(ValueError):  # somebody else's file
+            pictures.append(Picture(float(file.stem.removesuffix("s")), file))
+    return tuple(sorted(pictures, key=lambda picture: picture.t_s))

@@ -1,0 +1,164 @@
+"""Writes a run record while the run goes on; what was written survives a crash at any instant."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hil import metrics
+from hil.errors import BadInput
+from hil.record import layout
+from hil.record.camera import CameraKeeper
+from hil.record.journal import Columns, Journal, read_journal, write_parquet
+from hil.record.manifest import Manifest, Outcome, file_entry, replace_file, write_manifest
+from hil.record.reader import RunRecord, read_events, read_pictures
+from hil.record.schema import FRAME_COLUMNS, FRAME_NAMES, SAMPLE_COLUMNS, SAMPLE_NAMES, Column
+from hil.record.tlog import TlogWriter
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+_FLUSH_PERIOD_S = 1.0
+_PICTURE_PERIOD_S = 0.5
+
+
+class Recorder:
+    """One open run record.
+
+    Times are host times in s since the start of the controlled part (negative before it). `append`
+    takes one row of samples in the order of schema.SAMPLE_NAMES and costs a few microseconds; rows,
+    frames and events reach the system at least once per second of run time.
+    """
+
+    def __init__(
+        self,
+        out_dir: Path,
+        manifest: Manifest,
+        *,
+        record_camera: bool = False,
+        frame_rate_hz: float = 30.0,
+        rerun: bool = False,
+    ) -> None:
+        self.path = out_dir
+        self._manifest = manifest
+        self._rerun = rerun
+        self._claim(out_dir)
+        self._samples = Journal(out_dir / layout.SAMPLES_JOURNAL, SAMPLE_NAMES)
+        self._frames = Journal(out_dir / layout.FRAMES_JOURNAL, FRAME_NAMES)
+        self._tlog = TlogWriter(out_dir / layout.LINK, manifest.start_unix_us)
+        self._events = (out_dir / layout.EVENTS).open("w", encoding="utf-8")
+        self._camera: CameraKeeper | None = None
+        self._video = out_dir / layout.CAMERA if record_camera else None
+        self._frame_rate_hz = frame_rate_hz
+        self._next_flush_s = -math.inf
+        self._write_row = self._samples.write
+        self.link_frame = self._tlog.write
+        write_manifest(out_dir, manifest)
+
+    @staticmethod
+    def _claim(out_dir: Path) -> None:
+        """Make the folder, or take an empty one; anything else is refused untouched."""
+        try:
+            out_dir.mkdir(parents=True, exist_ok=True)
+            if any(out_dir.iterdir()):
+                raise BadInput(f"--out {out_dir}: the folder is not empty; name a new one")
+        except OSError as error:
+            raise BadInput(f"--out {out_dir}: cannot be made: {error.strerror}") from None
+
+    def append(self, row: Sequence[float]) -> None:
+        """Append one outer tick, values in the order of schema.SAMPLE_NAMES, NaN for unknown."""
+        self._write_row(row)
+        if row[0] >= self._next_flush_s:
+            self._next_flush_s = row[0] + _FLUSH_PERIOD_S
+            self.flush()
+
+    def frame(self, row: Sequence[float], image: NDArray[np.uint8] | None = None) -> None:
+        """Append one camera frame, values in the order of schema.FRAME_NAMES, and its image.
+
+        The image (H, W, 3) uint8 BGR must not be changed afterwards: it is encoded later.
+        """
+        self._frames.write(row)
+        if image is not None:
+            if self._camera is None:
+                self._camera = self._open_camera()
+            self._camera.take(row[0], image)
+
+    def _open_camera(self) -> CameraKeeper:
+        folder = self.path / layout.PICTURES
+        return CameraKeeper(folder, _PICTURE_PERIOD_S, self._frame_rate_hz, self._video)
+
+    def event(self, t_s: float, kind: str, text: str) -> None:
+        """Append one line of what happened: arming, stop, fault, disturbance, board's text."""
+        line = json.dumps({"t_s": t_s, "kind": kind, "text": text}, ensure_ascii=False)
+        self._events.write(line + "\n")
+
+    def flush(self) -> None:
+        """Hand everything so far to the system."""
+        self._samples.flush()
+        self._frames.flush()
+        self._tlog.flush()
+        self._events.flush()
+
+    def close(
+        self, outcome: Outcome, detail: str = "", link: metrics.LinkStats | None = None
+    ) -> RunRecord:
+        """Finish the record: tables, pictures, figures, Rerun file, and the manifest last."""
+        self._stop_writers()
+        samples = self._finish_table(layout.SAMPLES_JOURNAL, layout.SAMPLES, SAMPLE_COLUMNS)
+        frames = self._finish_table(layout.FRAMES_JOURNAL, layout.FRAMES, FRAME_COLUMNS)
+        stats = link or metrics.LinkStats()
+        ended = {
+            "outcome": outcome,
+            "outcome_detail": detail,
+            "tick_count": int(samples["t_s"].size),
+            "link": {key: float(value) for key, value in dataclasses.asdict(stats).items()},
+        }
+        run = RunRecord(
+            path=self.path,
+            manifest=self._manifest.model_copy(update=ended),
+            samples=samples,
+            frames=frames,
+            events=read_events(self.path / layout.EVENTS),
+            pictures=read_pictures(self.path / layout.PICTURES),
+        )
+        if samples["t_s"].size >= 2:
+            self._write_figures(run)
+        if self._rerun:
+            from hil.record.rrd import write_rrd  # noqa: PLC0415 - half a second, only when used
+
+            write_rrd(self.path / layout.RERUN, [run])
+        return self._seal(run)
+
+    def _stop_writers(self) -> None:
+        for writer in (self._samples, self._frames, self._tlog, self._events):
+            writer.close()
+        if self._camera is not None:
+            self._camera.close()
+
+    def _finish_table(self, journal: str, parquet: str, schema: Sequence[Column]) -> Columns:
+        columns = read_journal(self.path / journal)
+        write_parquet(self.path / parquet, columns, schema)
+        (self.path / journal).unlink()
+        return columns
+
+    def _write_figures(self, run: RunRecord) -> None:
+        figures = run.figures()
+        verdicts = [dataclasses.asdict(item) for item in run.verdicts()]
+        text = json.dumps(figures.to_json() | {"requirements": verdicts}, indent=1)
+        replace_file(self.path / layout.FIGURES, text.encode() + b"\n")
+
+    def _seal(self, run: RunRecord) -> RunRecord:
+        """Write the final manifest with size and SHA-256 of every file."""
+        files = {
+            file.relative_to(self.path).as_posix(): file_entry(file)
+            for file in sorted(self.path.rglob("*"))
+            if file.is_file() and file.name != layout.MANIFEST
+        }
+        manifest = run.manifest.model_copy(update={"files": files})
+        write_manifest(self.path, manifest)
+        return dataclasses.replace(run, manifest=manifest)

@@ -1,0 +1,268 @@
+"""The run record is whole after a run, readable after a crash, and the same for the same seed."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from hil.errors import BadInput
+from hil.record.layout import FRAMES_JOURNAL, SAMPLES_JOURNAL
+from hil.record.manifest import read_manifest
+from hil.record.reader import read_run
+from hil.record.recorder import Recorder
+from hil.record.schema import FRAME_NAMES, SAMPLE_COLUMNS, SAMPLE_NAMES, trace_row
+from tests.record.synthetic import frame_row, image_of, make_run, manifest, rows
+
+
+def test_values_come_back_as_they_were_given(tmp_path):
+    """Every value of every row is read back bit for bit, NaN where a signal does not exist."""
+    given = rows("pid", 3)
+    run = make_run(tmp_path / "run", "pid", 3)
+    back = np.column_stack([run.samples[name] for name in SAMPLE_NAMES])
+    again = read_run(tmp_path / "run")
+    np.testing.assert_array_equal(back, np.array(given, float))
+    for name in SAMPLE_NAMES:
+        np.testing.assert_array_equal(again.samples[name], run.samples[name])
+    assert again.problems == ()
+    assert again.manifest.outcome == "complete"
+    assert np.isnan(again.samples["s_x_m_s2"]).all()
+
+
+def test_columns_carry_unit_and_type(tmp_path):
+    """samples.parquet has the declared columns, each with its unit, flags as bool, null for NaN."""
+    make_run(tmp_path / "run", "pid")
+    table = pq.read_table(tmp_path / "run" / "samples.parquet")
+    assert table.column_names == list(SAMPLE_NAMES)
+    for column in SAMPLE_COLUMNS:
+        field = table.schema.field(column.name)
+        assert field.metadata[b"unit"].decode() == column.unit
+        assert str(field.type) == {"float64": "double"}.get(column.kind, column.kind)
+    assert table.column("in_layer").null_count == table.num_rows
+    assert table.column("saturated").to_pylist()[0] is True
+
+
+def test_unit_stands_in_the_name():
+    """A column with a unit ends in that unit, so that no reader has to guess it."""
+    suffix = {"m": "_m", "s": "_s", "rad": "_rad", "V": "_v", "counts": "_counts", "m/s": "_m_s",
+              "m/s^2": "_m_s2", "m/s^3": "_m_s3", "rad/s": "_rad_s", "px": "_px"}  # fmt: skip
+    for column in SAMPLE_COLUMNS:
+        assert not column.unit or column.name.endswith(suffix[column.unit]), column.name
+
+
+def test_same_seed_same_file(tmp_path):
+    """samples.parquet of two runs with one seed is the same file; another seed gives another."""
+    first, second, other = (tmp_path / name for name in ("a", "b", "c"))
+    make_run(first, seed=5)
+    time.sleep(0.01)
+    make_run(second, seed=5)
+    make_run(other, seed=6)
+    data = [(path / "samples.parquet").read_bytes() for path in (first, second, other)]
+    assert data[0] == data[1]
+    assert data[0] != data[2]
+
+
+@pytest.fixture(scope="module")
+def journal(tmp_path_factory):
+    """Return a folder as a killed process leaves it, with its rows."""
+    folder = tmp_path_factory.mktemp("cut") / "run"
+    recorder = Recorder(folder, manifest())
+    given = rows("asg-ism", 1)
+    for index, row in enumerate(given):
+        recorder.append(row)
+        recorder.frame(frame_row(row[0], index, row))
+    recorder.flush()
+    return folder, np.array(given, float)
+
+
+def test_every_cut_leaves_a_readable_prefix(journal, tmp_path):
+    """However many bytes reached the disk, exactly the whole rows among them are read."""
+    folder, given = journal
+    data = (folder / SAMPLES_JOURNAL).read_bytes()
+    header = data.index(b"\n") + 1
+    width = 8 * len(SAMPLE_NAMES)
+    offsets = [header, *range(header + 1, len(data), 997), header + width, header + width - 1]
+    copy = tmp_path / "run"
+    shutil.copytree(folder, copy)
+    for offset in offsets:
+        (copy / SAMPLES_JOURNAL).write_bytes(data[:offset])
+        run = read_run(copy)
+        back = np.column_stack([run.samples[name] for name in SAMPLE_NAMES])
+        np.testing.assert_array_equal(back, given[: (offset - header) // width])
+        assert "cut off" in run.problems[0]
+
+
+@pytest.mark.parametrize("offset", [0, 1, 40])
+def test_cut_inside_the_header_is_one_clear_line(journal, tmp_path, offset):
+    """A journal cut off before its first row is refused with its name, not with a traceback."""
+    copy = tmp_path / "run"
+    shutil.copytree(journal[0], copy)
+    (copy / SAMPLES_JOURNAL).write_bytes((copy / SAMPLES_JOURNAL).read_bytes()[:offset])
+    with pytest.raises(BadInput, match=r"samples.journal: cut off before the first row"):
+        read_run(copy)
+
+
+def test_frames_cut_anywhere_never_hide_the_samples(journal, tmp_path):
+    """The table of frames may be lost in a crash; the samples are read all the same."""
+    copy = tmp_path / "run"
+    shutil.copytree(journal[0], copy)
+    data = (copy / FRAMES_JOURNAL).read_bytes()
+    for offset in (0, 10, 600, len(data) - 3):
+        (copy / FRAMES_JOURNAL).write_bytes(data[:offset])
+        assert read_run(copy).samples["t_s"].size == len(journal[1])
+
+
+KILLED = """
+import itertools, pathlib, sys
+from hil.record.recorder import Recorder
+from tests.record.synthetic import manifest, rows
+recorder = Recorder(pathlib.Path(sys.argv[1]), manifest())
+base = rows("asg-ism", 1)
+for i in itertools.count():
+    row = base[i % len(base)]
+    recorder.append((i / 30, *row[1:]))
+    recorder.link_frame(i / 30, bytes([0xFD, 0, 0, 0, 0, 255, 190, 0, 0, 0, 1, 2]))
+    if i == 3000:
+        print("go", flush=True)
+"""
+
+
+def test_killed_process_leaves_its_rows(tmp_path):
+    """SIGKILL in mid-write loses at most the last second of run time, and the reader says so."""
+    command = [sys.executable, "-c", KILLED, str(tmp_path / "run")]
+    root = Path(__file__).resolve().parents[2]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, cwd=root) as process:
+        process.stdout.readline()
+        process.send_signal(signal.SIGKILL)
+    run = read_run(tmp_path / "run")
+    t_s = run.samples["t_s"]
+    assert t_s.size >= 3000 - 30
+    np.testing.assert_array_equal(t_s, np.arange(t_s.size) / 30)
+    assert run.manifest.outcome == "running"
+    assert "cut off" in run.problems[0]
+
+
+def test_altered_file_is_recognised(tmp_path):
+    """One changed value in a finished record is told by name; the rest stays usable."""
+    make_run(tmp_path / "run")
+    other = make_run(tmp_path / "other", seed=9)
+    assert other.problems == ()
+    os.replace(tmp_path / "other" / "samples.parquet", tmp_path / "run" / "samples.parquet")
+    problems = read_run(tmp_path / "run").problems
+    assert len(problems) == 1
+    assert problems[0].startswith("samples.parquet")
+    (tmp_path / "run" / "link.tlog").unlink()
+    assert "link.tlog is missing" in read_run(tmp_path / "run").problems
+
+
+def test_unfit_folders_are_one_clear_line(tmp_path):
+    """Not a folder, not a record, damaged, newer: each refusal names the file and the fault."""
+    with pytest.raises(BadInput, match=r"nowhere: no such folder"):
+        read_run(tmp_path / "nowhere")
+    with pytest.raises(BadInput, match=r"not a run record \(manifest.json is missing\)"):
+        read_run(tmp_path)
+    folder = tmp_path / "run"
+    make_run(folder)
+    whole = json.loads((folder / "manifest.json").read_text())
+    for text, message in (
+        ("{", "damaged, not readable as JSON"),
+        ("[1]", "schema_version is missing"),
+        (json.dumps(whole | {"schema_version": 99}), "schema_version = 99, this program reads up"),
+        (json.dumps(whole | {"seed": "many"}), "damaged: seed: "),
+    ):
+        (folder / "manifest.json").write_text(text)
+        with pytest.raises(BadInput, match=message):
+            read_run(folder)
+
+
+def test_torn_parquet_is_one_clear_line(tmp_path):
+    """A Parquet file without its end is refused with its name."""
+    make_run(tmp_path / "run")
+    path = tmp_path / "run" / "samples.parquet"
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(BadInput, match=r"samples.parquet: damaged, not readable as Parquet"):
+        read_run(tmp_path / "run")
+
+
+def test_output_folder_in_use_is_left_untouched(tmp_path):
+    """A folder with anything in it is refused, and nothing is written to it."""
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(BadInput, match="not empty"):
+        Recorder(tmp_path, manifest())
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+    with pytest.raises(BadInput, match="cannot be made"):
+        Recorder(tmp_path / "notes.txt" / "run", manifest())
+
+
+def test_pictures_start_middle_end(tmp_path):
+    """With images, the record keeps pictures; middle is where half of the way was travelled."""
+    run = make_run(tmp_path / "run", images=True)
+    moments = read_run(tmp_path / "run").moments()
+    assert list(moments) == ["start", "middle", "end"]
+    assert moments["start"].t_s == 0.0
+    assert moments["end"].t_s == pytest.approx(4.0, abs=1e-3)
+    # Way ~ exp(-2 t): half of it is done at ln 2 / 2 = 0.35 s; pictures lie 0.5 s apart.
+    assert moments["middle"].t_s == pytest.approx(0.5, abs=0.04)
+    image = cv2.imread(str(moments["start"].path))
+    assert image.shape == (480, 640, 3)
+    assert len(run.pictures) == 9
+
+
+def test_video_is_lossless_and_stamped(tmp_path):
+    """--record-camera keeps every frame as it was, one row of frames.parquet for each."""
+    recorder = Recorder(tmp_path / "run", manifest(), record_camera=True, rerun=False)
+    images = []
+    for index, row in enumerate(rows("pid", 1, duration_s=0.5)):
+        frame = frame_row(row[0], index, row)
+        images.append(image_of(frame))
+        recorder.frame(frame, images[-1])
+        recorder.append(row)
+    run = recorder.close("complete")
+    video = cv2.VideoCapture(str(tmp_path / "run" / "camera.mkv"))
+    for image in images:
+        there, back = video.read()
+        assert there
+        np.testing.assert_array_equal(back, image)
+    assert not video.read()[0]
+    assert run.frames["t_arrival_s"].size == len(images)
+    assert set(FRAME_NAMES) == set(run.frames)
+
+
+def test_tick_costs_microseconds(tmp_path):
+    """Appending one row stays far below what a tick may cost (5 us; bound wide for busy machines)."""
+    recorder = Recorder(tmp_path / "run", manifest(), rerun=False)
+    given = [(i / 30, *row[1:]) for i, row in enumerate(rows("asg-ism", 1) * 20)]
+    best_s = math.inf
+    for _ in range(3):
+        start_s = time.perf_counter()
+        for row in given:
+            recorder.append(row)
+        best_s = min(best_s, (time.perf_counter() - start_s) / len(given))
+    assert best_s < 20e-6
+
+
+def test_trace_of_a_law_fills_its_columns():
+    """Terms land in their columns by name; a law without sliding variables leaves NaN."""
+    row = trace_row({"s_x": 1.0, "zeta_m_s2": 2.0, "in_layer": True})
+    named = dict(zip([c.name for c in SAMPLE_COLUMNS if c.trace_key], row, strict=True))
+    assert named["s_x_m_s2"] == 1.0
+    assert named["zeta_m_s2"] == 2.0
+    assert named["in_layer"] is True
+    assert math.isnan(named["s_y_m_s2"])
+
+
+def test_manifest_of_a_record_without_a_close(journal):
+    """From its first instant a record says which run it is."""
+    found = read_manifest(journal[0])
+    assert (found.outer, found.seed, found.scenario_name) == ("asg-ism", 1, "scenario-1")
