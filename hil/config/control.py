@@ -36,7 +36,7 @@ class OuterLimits(Section):
     approach_accel_m_s2: float | None = Field(
         1.0, gt=0, le=50, description="m/s^2, most that the velocity error asks for"
     )
-    lambda_m_s: float = Field(0.05, ge=0, le=1, description="m/s, damping of the inverse of B")
+    lambda_m_s: float = Field(0.05, ge=1e-4, le=1, description="m/s, damping of the inverse of B")
     spin_decay_s: float = Field(
         0.2, gt=0, le=10, description="s, a turn dies with it where B is damped"
     )
