@@ -48,6 +48,14 @@ SIDED = {
 }
 
 
+class Zone(Section):
+    """A round piece of floor; its edge is 1 cm soft."""
+
+    x_m: float = Field(ge=-50, le=50, description="world X of the centre")
+    y_m: float = Field(ge=-50, le=50, description="world Y of the centre")
+    radius_m: float = Field(ge=0.02, le=50)
+
+
 class Disturbance(Section):
     """One disturbance in force from `start_s` to `end_s`.
 
@@ -63,6 +71,7 @@ class Disturbance(Section):
     frequency_hz: float = Field(0.5, gt=0, le=200, description="of the sine, or top of the noise")
     phase_rad: float = Field(0.0, ge=-7, le=7, description="of the sine")
     seed: int = Field(1, ge=0, le=2**31 - 1, description="of the noise, with the seed of the run")
+    zone: Zone | None = Field(None, description="acts only while the centre of mass is in there")
 
     @model_validator(mode="after")
     def _ends_after_start(self) -> Self:
@@ -70,15 +79,6 @@ class Disturbance(Section):
         if self.shape == "pulse" and self.end_s is None:
             raise ValueError("a pulse needs end_s")
         return self
-
-
-class FloorPatch(Section):
-    """A round patch of floor with other friction."""
-
-    x_m: float = Field(ge=-50, le=50)
-    y_m: float = Field(ge=-50, le=50)
-    radius_m: float = Field(gt=0, le=50)
-    friction_ratio: float = Field(ge=0, le=10, description="friction on the patch over that beside")
 
 
 class Fault(Section):

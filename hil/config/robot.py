@@ -93,6 +93,16 @@ class RobotConfig(Section):
     floor: FloorConfig
 
     @model_validator(mode="after")
+    def _current_slow_enough(self) -> Self:
+        """RK4 at 1e-4 s is stable up to rates of 27,850 1/s; refuse a robot that comes near."""
+        channel_ohm = self.bridge.resistance_ohm + self.bridge.drop_v / self.bridge.smoothing_a
+        rate = self.motor.resistance_ohm + self.motor.per_side * channel_ohm
+        if rate / self.motor.inductance_h > 20_000:
+            least_h = rate / 20_000
+            raise ValueError(f"motor.inductance_h must be at least {least_h:.2g} H at these drops")
+        return self
+
+    @model_validator(mode="after")
     def _pivot_inside_the_wheelbase(self) -> Self:
         wheelbase_m = self.front_axle_m + self.rear_axle_m
         if self.d0_m >= wheelbase_m:

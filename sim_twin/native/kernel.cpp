@@ -1,0 +1,171 @@
+#include "kernel.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace twin {
+namespace {
+
+// Pin levels (A << 1) | B in the order forward motion meets them: A leads B.
+constexpr std::uint8_t kGray[4] = {0b00, 0b10, 0b11, 0b01};
+// A jam is a damper stiff enough to hold a stalled motor's torque below 0.1 rad/s.
+constexpr double kJam_n_m_s_rad = 12.0;
+
+}  // namespace
+
+Encoder::Encoder(int counts_per_turn)
+    : counts_per_rad_(counts_per_turn / (2.0 * 3.14159265358979323846)) {}
+
+void Encoder::reset(double angle_rad) {
+  angle_rad_ = angle_rad;
+  count_ = static_cast<std::int64_t>(std::floor(position(angle_rad)));
+  pins_ = kGray[count_ & 3];
+}
+
+// A dead channel stays at the level its pin has now; swapped wires exchange the pins.
+std::uint8_t Encoder::level(const FaultState::Side& fault) const {
+  std::uint8_t ab = kGray[count_ & 3];
+  if (fault.swapped) ab = static_cast<std::uint8_t>(((ab & 1) << 1) | (ab >> 1));
+  if (fault.dead_a) ab = static_cast<std::uint8_t>((ab & 0b01) | (pins_ & 0b10));
+  if (fault.dead_b) ab = static_cast<std::uint8_t>((ab & 0b10) | (pins_ & 0b01));
+  return ab;
+}
+
+void Encoder::move(double angle_rad, double t0_us, double h_us, const FaultState::Side& fault,
+                   int side, std::vector<PinEdge>& edges) {
+  const double begin = position(angle_rad_), end = position(angle_rad);
+  const auto last = static_cast<std::int64_t>(std::floor(end));
+  const double us_per_count = end != begin ? h_us / (end - begin) : 0.0;
+  angle_rad_ = angle_rad;
+  do {  // once without a crossing too: wires may have changed
+    const bool forward = last > count_;
+    const double boundary = static_cast<double>(forward ? count_ + 1 : count_);
+    const double t_us = last == count_ ? t0_us : t0_us + us_per_count * (boundary - begin);
+    if (last != count_) count_ += forward ? 1 : -1;
+    const std::uint8_t ab = level(fault);
+    if (ab != pins_) edges.push_back({t_us, side, ab});
+    pins_ = ab;
+  } while (count_ != last);
+}
+
+Kernel::Kernel(const PlantParams& params, const KernelOptions& options,
+               std::unique_ptr<BoardSide> board)
+    : plant_(params),
+      options_(options),
+      board_(std::move(board)),
+      encoders_{Encoder(options.counts_per_turn), Encoder(options.counts_per_turn)} {
+  if (options.step_us <= 0 || kPoseSpacing_us % options.step_us != 0) {
+    throw std::invalid_argument("step_us must divide 1000 us");
+  }
+  reset(0.0, 0.0, 0.0);
+}
+
+void Kernel::reset(double x_m, double y_m, double theta_rad) {
+  plant_.reset(x_m, y_m, theta_rad);
+  for (Encoder& encoder : encoders_) encoder.reset(0.0);
+  time_us_ = 0;
+  pose_count_ = 0;
+  drive_ = {};
+  battery_v_ = plant_.battery_v(drive_, 0.0);
+  board_held_ = false;
+  board_->sent.clear();
+  const std::uint8_t pins[2] = {encoders_[0].pins(), encoders_[1].pins()};
+  board_->set_reset(false, 0, pins);
+  remember();
+}
+
+void Kernel::remember() {
+  const StateVector& x = plant_.state();
+  poses_[static_cast<std::size_t>(pose_count_) % kPoses] = {x[kX], x[kY], x[kTheta]};
+  ++pose_count_;
+}
+
+std::int64_t Kernel::advance(std::int64_t t_us) {
+  while (time_us_ < t_us && board_->sent.empty()) step();
+  return time_us_;
+}
+
+std::vector<Chunk> Kernel::take_sent() {
+  std::vector<Chunk> out;
+  out.swap(board_->sent);
+  return out;
+}
+
+void Kernel::follow_reset_line() {
+  if (fault_.board_in_reset == board_held_) return;
+  board_held_ = fault_.board_in_reset;
+  const std::uint8_t pins[2] = {encoders_[0].pins(), encoders_[1].pins()};
+  board_->set_reset(board_held_, time_us_, pins);
+}
+
+void Kernel::set_drive() {
+  drive_.duty_left = board_->duty(0) * (fault_.side[0].reversed ? -1.0 : 1.0);
+  drive_.duty_right = board_->duty(1) * (fault_.side[1].reversed ? -1.0 : 1.0);
+  drive_.jam_left = fault_.side[0].stuck ? kJam_n_m_s_rad : 0.0;
+  drive_.jam_right = fault_.side[1].stuck ? kJam_n_m_s_rad : 0.0;
+}
+
+void Kernel::integrate(double t_s, double h_s) {
+  if (disturbances_.empty()) {
+    constexpr LoadVector kNone{};
+    plant_.step(h_s, drive_, kNone, kNone, kNone);
+    return;
+  }
+  // Zones are looked up at the pose where the step begins: 0.1 mm at most.
+  const double x_m = plant_.state()[kX], y_m = plant_.state()[kY];
+  const LoadVector end = disturbances_.loads(t_s + h_s, x_m, y_m);
+  plant_.step(h_s, drive_, disturbances_.loads(t_s, x_m, y_m),
+              disturbances_.loads(t_s + 0.5 * h_s, x_m, y_m), end);
+  sag_v_ = end[kBatterySag];
+}
+
+void Kernel::step() {
+  const auto t0_us = static_cast<double>(time_us_);
+  const auto h_us = static_cast<double>(options_.step_us);
+  if (!faults_.empty()) {
+    fault_ = faults_.at(1e-6 * t0_us);
+    follow_reset_line();
+  }
+  set_drive();
+  integrate(1e-6 * t0_us, 1e-6 * h_us);
+  const StateVector& x = plant_.state();
+  edges_.clear();
+  for (int side = 0; side < 2; ++side) {
+    encoders_[side].move(x[kWheelL + side], t0_us, h_us, fault_.side[side], side, edges_);
+  }
+  std::stable_sort(edges_.begin(), edges_.end(),
+                   [](const PinEdge& a, const PinEdge& b) { return a.t_us < b.t_us; });
+  for (const PinEdge& edge : edges_) board_->edge(edge);
+  time_us_ += options_.step_us;
+  battery_v_ = plant_.battery_v(drive_, sag_v_);
+  board_->advance_to(time_us_, battery_v_);
+  if (time_us_ % kPoseSpacing_us == 0) {
+    if (!std::isfinite(x[kX] + x[kEta1] + x[kThetaDot] + x[kCurrentL] + x[kCurrentR])) {
+      throw std::runtime_error("the simulated robot's state is not finite any more");
+    }
+    remember();
+  }
+}
+
+PoseSample Kernel::pose_at(double t_us) const {
+  const double now_us = static_cast<double>(time_us_);
+  const double newest_us = static_cast<double>((pose_count_ - 1) * kPoseSpacing_us);
+  const double oldest_us = newest_us - static_cast<double>((kPoses - 1) * kPoseSpacing_us);
+  if (t_us > now_us || t_us < 0.0 || t_us < oldest_us) {
+    throw std::out_of_range("pose asked for outside the time that is remembered");
+  }
+  const StateVector& x = plant_.state();
+  const PoseSample now{x[kX], x[kY], x[kTheta]};
+  const auto index = static_cast<std::int64_t>(t_us / static_cast<double>(kPoseSpacing_us));
+  const double from_us = static_cast<double>(index * kPoseSpacing_us);
+  const PoseSample& a = poses_[static_cast<std::size_t>(index) % kPoses];
+  const bool open = index + 1 >= pose_count_;  // the piece up to now is still being driven
+  if (open && now_us <= from_us) return a;
+  const PoseSample& b = open ? now : poses_[static_cast<std::size_t>(index + 1) % kPoses];
+  const double u = (t_us - from_us) / (open ? now_us - from_us : double{kPoseSpacing_us});
+  return {a.x_m + u * (b.x_m - a.x_m), a.y_m + u * (b.y_m - a.y_m),
+          a.theta_rad + u * (b.theta_rad - a.theta_rad)};
+}
+
+}  // namespace twin

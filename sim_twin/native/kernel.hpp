@@ -1,0 +1,97 @@
+// Robot and board in lockstep on one virtual clock of integer microseconds.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "kernel_board.hpp"
+#include "kernel_events.hpp"
+#include "plant.hpp"
+
+namespace twin {
+
+// Two-channel encoder on one wheel: turns wheel angle into pin edges at their own times.
+class Encoder {
+ public:
+  explicit Encoder(int counts_per_turn);
+  void reset(double angle_rad);
+  // Appends the edges of a step from t0_us to t0_us + h_us that ends at angle_rad.
+  void move(double angle_rad, double t0_us, double h_us, const FaultState::Side& fault, int side,
+            std::vector<PinEdge>& edges);
+  std::uint8_t pins() const { return pins_; }
+  std::int64_t true_count() const { return count_; }
+
+ private:
+  double position(double angle_rad) const { return angle_rad * counts_per_rad_ + 0.5; }
+  std::uint8_t level(const FaultState::Side& fault) const;
+
+  double counts_per_rad_;
+  double angle_rad_ = 0.0;
+  std::int64_t count_ = 0;
+  std::uint8_t pins_ = 0;
+};
+
+struct PoseSample {
+  double x_m = 0.0, y_m = 0.0, theta_rad = 0.0;
+};
+
+struct KernelOptions {
+  std::int64_t step_us = 100;
+  int counts_per_turn = 1920;
+};
+
+class Kernel {
+ public:
+  Kernel(const PlantParams& params, const KernelOptions& options,
+         std::unique_ptr<BoardSide> board);
+
+  // Robot at rest at the pose, board powered up, time zero.
+  void reset(double x_m, double y_m, double theta_rad);
+  void add_disturbance(const Disturbance& d) { disturbances_.add(d); }
+  void add_fault(const Fault& f) { faults_.add(f); }
+
+  // Run until t_us is reached, or to the end of the step in which the board has sent something.
+  // Returns the time reached. Throws when the state is no longer finite.
+  std::int64_t advance(std::int64_t t_us);
+  void receive(std::int64_t t_us, std::string bytes) { board_->receive(t_us, std::move(bytes)); }
+  std::vector<Chunk> take_sent();
+
+  std::int64_t time_us() const { return time_us_; }
+  // Pose at a time in the last two seconds, straight lines between samples 1 ms apart.
+  PoseSample pose_at(double t_us) const;
+  const StateVector& state() const { return plant_.state(); }
+  double battery_v() const { return battery_v_; }
+  double duty(int side) const { return side == 0 ? drive_.duty_left : drive_.duty_right; }
+  std::int64_t true_count(int side) const { return encoders_[side].true_count(); }
+
+ private:
+  void step();
+  void follow_reset_line();
+  void set_drive();
+  void integrate(double t_s, double h_s);
+  void remember();
+
+  static constexpr std::int64_t kPoseSpacing_us = 1000;
+  static constexpr std::size_t kPoses = 2048;
+
+  Plant plant_;
+  KernelOptions options_;
+  std::unique_ptr<BoardSide> board_;
+  Disturbances disturbances_;
+  Faults faults_;
+  FaultState fault_;
+  Drive drive_;
+  std::array<Encoder, 2> encoders_;
+  std::vector<PinEdge> edges_;
+  std::array<PoseSample, kPoses> poses_{};
+  std::int64_t pose_count_ = 0;
+  std::int64_t time_us_ = 0;
+  double sag_v_ = 0.0;
+  double battery_v_ = 0.0;
+  bool board_held_ = false;
+};
+
+}  // namespace twin

@@ -1,0 +1,105 @@
+#include "kernel_board.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace twin {
+namespace {
+
+// Battery divider 3:1 on a 10-bit converter with 5 V reference.
+constexpr double kAdcStep_v = 3.0 * 5.0 / 1024.0;
+// The core fills its transmit ring, the UART empties it: take no more than this ahead of the UART,
+// so that the ring can fill up here as it does on the board. Long enough for a frame in one piece.
+constexpr double kUartAhead_us = 20000.0;
+
+}  // namespace
+
+std::uint32_t HostBoard::clock_us(double t_us) const {
+  const double own_us = (t_us - boot_us_) * (1.0 + 1e-6 * options_.clock_ppm);
+  return clock_boot_us_ + static_cast<std::uint32_t>(static_cast<std::int64_t>(own_us));
+}
+
+void HostBoard::set_reset(bool held, std::int64_t t_us, const std::uint8_t pins[2]) {
+  held_ = held;
+  outputs_ = {};
+  if (held) return;
+  clock_boot_us_ = powered_ ? 0 : options_.clock_start_us;
+  powered_ = true;
+  boot_us_ = static_cast<double>(t_us);
+  uart_free_us_ = boot_us_;
+  ticks_ = 0;
+  edges_.clear();
+  edges_done_ = 0;
+  hil::board_init(board_);
+  for (int side = 0; side < 2; ++side) encoder_[side] = hil::Quadrature{pins[side], 0, 0};
+}
+
+void HostBoard::receive(std::int64_t t_us, std::string bytes) {
+  received_.push_back({t_us, std::move(bytes)});
+}
+
+void HostBoard::catch_up(double t_us) {
+  for (; edges_done_ < edges_.size() && edges_[edges_done_].t_us <= t_us; ++edges_done_) {
+    const PinEdge& edge = edges_[edges_done_];
+    hil::quadrature_update(encoder_[edge.side], edge.ab);
+  }
+  while (!received_.empty() && static_cast<double>(received_.front().t_us) <= t_us) {
+    const Chunk& chunk = received_.front();
+    const auto at_us = static_cast<double>(chunk.t_us);
+    if (!held_) {
+      hil::board_receive(board_, reinterpret_cast<const std::uint8_t*>(chunk.bytes.data()),
+                         static_cast<std::uint16_t>(chunk.bytes.size()), clock_us(at_us));
+      transmit(at_us);
+    }
+    received_.pop_front();
+  }
+}
+
+void HostBoard::transmit(double t_us) {
+  const double ahead_us = std::max(uart_free_us_ - t_us, 0.0);
+  const double room = (kUartAhead_us - ahead_us) / options_.byte_us;
+  if (room < 1.0) return;
+  std::uint8_t buffer[2048];
+  const auto limit = static_cast<std::uint16_t>(std::min(room, double{sizeof buffer}));
+  const std::uint16_t n = hil::board_transmit(board_, buffer, limit);
+  if (n == 0) return;
+  uart_free_us_ = t_us + ahead_us + n * options_.byte_us;
+  sent.push_back({std::llround(uart_free_us_),
+                  std::string(reinterpret_cast<const char*>(buffer), n)});
+}
+
+void HostBoard::tick(double t_us, double battery_v) {
+  const double steps = std::clamp(battery_v / kAdcStep_v, 0.0, 1023.0);
+  hil::BoardInputs inputs{};
+  inputs.t_us = clock_us(t_us);
+  inputs.counts_left = encoder_[0].counts;
+  inputs.counts_right = encoder_[1].counts;
+  inputs.encoder_faults = static_cast<std::uint16_t>(encoder_[0].illegal + encoder_[1].illegal);
+  inputs.battery_mv = static_cast<std::uint16_t>(1000.0 * kAdcStep_v * std::floor(steps));
+  hil::board_tick(board_, inputs, outputs_);
+  transmit(t_us);
+}
+
+void HostBoard::advance_to(std::int64_t t_us, double battery_v) {
+  const auto until_us = static_cast<double>(t_us);
+  if (!held_) {
+    const double period_us = hil::TICK_US / (1.0 + 1e-6 * options_.clock_ppm);
+    double next_us = boot_us_ + static_cast<double>(ticks_ + 1) * period_us;
+    while (next_us <= until_us) {
+      catch_up(next_us);
+      tick(next_us, battery_v);
+      ++ticks_;
+      next_us = boot_us_ + static_cast<double>(ticks_ + 1) * period_us;
+    }
+  }
+  catch_up(until_us);
+  edges_.clear();
+  edges_done_ = 0;
+}
+
+double HostBoard::duty(int side) const {
+  const std::int16_t pwm = side == 0 ? outputs_.pwm_left : outputs_.pwm_right;
+  return static_cast<double>(pwm) / hil::PWM_TOP;
+}
+
+}  // namespace twin

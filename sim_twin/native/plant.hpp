@@ -1,0 +1,109 @@
+// The robot of control.md section 1 as a differential equation: body, motors, bridge, battery, floor.
+// Frames: world X right, Y up; body x forward, y left; theta counter-clockwise. SI units.
+// Sides: 0 left, 1 right. Positive duty turns the wheels forward.
+#pragma once
+
+#include <array>
+
+namespace twin {
+
+// One list: C++ fields, their Python names, and what a caller must set (no defaults).
+#define TWIN_PLANT_PARAMETERS(X)                                                              \
+  X(mass_kg) X(inertia_kg_m2) X(wheel_radius_m) X(track_m) X(front_axle_m) X(rear_axle_m)    \
+  X(d0_m) X(wheel_inertia_kg_m2)                                                              \
+  X(motor_per_side) X(motor_resistance_ohm) X(motor_inductance_h)                             \
+  X(motor_torque_constant_n_m_a) X(motor_emf_constant_v_s_rad) X(motor_gear_ratio)            \
+  X(motor_gear_efficiency_ratio) X(motor_rotor_inertia_kg_m2) X(motor_coulomb_n_m)            \
+  X(motor_stiction_n_m) X(motor_stribeck_rad_s) X(motor_viscous_n_m_s_rad)                    \
+  X(bridge_drop_v) X(bridge_resistance_ohm) X(bridge_smoothing_a)                             \
+  X(battery_full_v) X(battery_empty_v) X(battery_capacity_a_h) X(battery_resistance_ohm)      \
+  X(battery_charge_start_ratio) X(battery_idle_a)                                             \
+  X(floor_rolling_ratio) X(floor_friction_ratio) X(floor_smoothing_m_s)                       \
+  X(floor_slip_smoothing_m_s)
+
+struct PlantParams {
+#define X(name) double name = 0.0;
+  TWIN_PLANT_PARAMETERS(X)
+#undef X
+  bool slip = false;  // false: operative constraint (2.31) and rolling wheels
+};
+
+// Index of each state in the vector that is integrated.
+enum State : int {
+  kX, kY, kTheta,              // m, m, rad: centre of mass in the world
+  kEta1, kEta2, kThetaDot,     // m/s, m/s, rad/s: body frame; eta2 = -d0 theta_dot unless slip
+  kCurrentL, kCurrentR,        // A, one motor of each side
+  kWheelL, kWheelR,            // rad, wheel angles
+  kOmegaL, kOmegaR,            // rad/s, wheel speeds; follow from eta unless slip
+  kCharge,                     // 0..1
+  kStates
+};
+using StateVector = std::array<double, kStates>;
+
+// What acts on the robot from outside besides the bridge, with the scenario's name for it
+// (hil.config.events.Target). Accelerations add to eta1_dot, eta2_dot and theta_ddot; forces and
+// the torque act at the centre of mass in the body frame; wheel loads oppose forward when positive;
+// slopes raise the floor along world X and Y; the friction change is added to 1.
+#define TWIN_LOADS(X)                       \
+  X(kAccForward, "eta1_dot_m_s2")           \
+  X(kAccLateral, "eta2_dot_m_s2")           \
+  X(kAccYaw, "theta_ddot_rad_s2")           \
+  X(kForceForward, "force_forward_n")       \
+  X(kForceLeft, "force_left_n")             \
+  X(kTorqueYaw, "torque_yaw_n_m")           \
+  X(kLoadLeft, "load_left_n_m")             \
+  X(kLoadRight, "load_right_n_m")           \
+  X(kSlopeX, "slope_x_rad")                 \
+  X(kSlopeY, "slope_y_rad")                 \
+  X(kFrictionChange, "friction_change_ratio") \
+  X(kBatterySag, "battery_sag_v")
+enum Load : int {
+#define X(id, name) id,
+  TWIN_LOADS(X)
+#undef X
+  kLoads
+};
+using LoadVector = std::array<double, kLoads>;
+
+struct Drive {
+  double duty_left = 0.0, duty_right = 0.0;    // -1..1, held over a step
+  double jam_left = 0.0, jam_right = 0.0;      // N m s/rad, gear jam as a stiff damper
+};
+
+class Plant {
+ public:
+  explicit Plant(const PlantParams& params);
+
+  // Rest at a pose, full start charge, wheel angles zero.
+  void reset(double x_m, double y_m, double theta_rad);
+
+  // One RK4 step of h seconds; loads at its begin, middle and end.
+  void step(double h_s, const Drive& drive, const LoadVector& begin, const LoadVector& middle,
+            const LoadVector& end);
+
+  const StateVector& state() const { return x_; }
+  StateVector& state() { return x_; }
+  double battery_v(const Drive& drive, double sag_v) const;  // at the terminals, now
+  StateVector derivative(const StateVector& x, const Drive& drive, const LoadVector& load) const;
+
+ private:
+  struct SideForces {
+    double current_dot;   // A/s, one motor
+    double torque_n_m;    // all motors of the side at the wheels, friction and load taken off
+    double rolling_sign;  // smoothed sign of the rim speed
+  };
+  SideForces side(double current_a, double omega_rad_s, double duty, double jam, double load_n_m,
+                  double battery_v) const;
+  double battery_v(const StateVector& x, const Drive& drive, double sag_v) const;
+  void constrained(const StateVector& x, const SideForces* sides, const LoadVector& load,
+                   const double* gravity, StateVector& dx) const;
+  void slipping(const StateVector& x, const SideForces* sides, const LoadVector& load,
+                const double* gravity, StateVector& dx) const;
+  void apply_constraint(StateVector& x) const;
+
+  PlantParams p_;
+  StateVector x_{};
+  double wheel_side_inertia_;  // kg m^2, wheels and reflected rotors of one side
+};
+
+}  // namespace twin
