@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from hil.types import Pose, PoseMeasurement
+    from hil.types import Pose, PoseMeasurement, Vec2
 
 
 class ByteStream(Protocol):
@@ -43,6 +43,7 @@ class Truth:
     pose: Pose
     eta1_m_s: float
     theta_dot_rad_s: float
+    z1_m: Vec2  # the flat output (2.35) with the robot's true d0
 
 
 class Rig(Protocol):
@@ -58,6 +59,9 @@ class Rig(Protocol):
 
     def poll_frame(self) -> Frame | None:
         """Return the oldest frame not yet taken that has arrived by now."""
+
+    def begin(self, t_start_s: float) -> None:
+        """Take note that the controlled part begins: timed disturbances and faults count from it."""
 
     def truth(self) -> Truth | None:
         """Return the true state now, or None where nobody knows it."""

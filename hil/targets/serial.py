@@ -104,6 +104,9 @@ class SerialRig:
         """Return the oldest frame waiting; None when there is none, or no camera."""
         return self._camera.poll() if self._camera is not None else None
 
+    def begin(self, t_start_s: float) -> None:
+        """Do nothing: nobody disturbs a real robot on a schedule."""
+
     def truth(self) -> Truth | None:
         """Return None: a camera's word is all there is."""
         return None
