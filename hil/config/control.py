@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import tomllib
+from importlib.resources import files
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from hil.config.base import Section
 
 OuterLawName = Literal["asg-ism", "pid"]
+GainSetName = Literal["tuned", "thesis"]
 EstimatorName = Literal["fused", "camera-only"]
 
 
@@ -51,31 +54,70 @@ class OuterLimits(Section):
 class AsgIsmGains(Section):
     """Gains of backstepping with ASG-ISM (8.6)-(8.22), control.md section 2."""
 
-    k1_s: float = Field(1.0, gt=0, le=100, description="1/s at p = 1, position error to speed")
-    k2_s: float = Field(3.0, gt=0, le=100, description="1/s at p = 1, speed error to acceleration")
+    k1_s: float = Field(gt=0, le=100, description="1/s at p = 1, position error to speed")
+    k2_s: float = Field(gt=0, le=100, description="1/s at p = 1, speed error to acceleration")
     p: float = Field(1.0, ge=1, le=3, description="exponent 1 + epsilon of (8.6), (8.11)")
-    alpha_m_s3: float = Field(1.0, ge=0, le=1e4, description="m/s^3, gain of the sliding term")
-    eps0_m_s2: float = Field(0.1, ge=0, le=100, description="m/s^2, layer eps0/(t+mu0)^(1+beta)")
+    alpha_m_s3: float = Field(ge=0, le=1e4, description="m/s^3, gain of the sliding term")
+    eps0_m_s2: float = Field(0.0, ge=0, le=100, description="m/s^2, layer eps0/(t+mu0)^(1+beta)")
     beta: float = Field(0.5, gt=0, lt=1, description="rate at which the layer shrinks, (4.20)")
-    eps_min_m_s2: float = Field(0.1, gt=0, le=100, description="m/s^2, floor of the layer")
-    mu0_s: float = Field(1.0, gt=0, le=100, description="s, mu = 1/(t + mu0)")
-    sigma_m_s2: float = Field(0.05, ge=0, le=100, description="m/s^2, scale of the cost H in Psi")
+    eps_min_m_s2: float = Field(gt=0, le=100, description="m/s^2, floor of the layer")
+    mu0_s: float = Field(gt=0, le=100, description="s, mu = 1/(t + mu0)")
+    sigma_m_s2: float = Field(ge=0, le=100, description="m/s^2, scale of the cost H in Psi")
 
 
 class PidGains(Section):
     """Gains of the state feedback in PID form on the linearised chain (control.md section 2)."""
 
-    kp_s3: float = Field(6.0, gt=0, le=1e6, description="1/s^3, on delta1")
+    kp_s3: float = Field(gt=0, le=1e6, description="1/s^3, on delta1")
     ki_s4: float = Field(0.0, ge=0, le=1e6, description="1/s^4, on the integral of delta1")
-    kd1_s2: float = Field(11.0, gt=0, le=1e6, description="1/s^2, on d delta1/dt")
-    kd2_s: float = Field(6.0, gt=0, le=1e4, description="1/s, on d2 delta1/dt2")
+    kd1_s2: float = Field(gt=0, le=1e6, description="1/s^2, on d delta1/dt")
+    kd2_s: float = Field(gt=0, le=1e4, description="1/s, on d2 delta1/dt2")
 
 
 class Gains(Section):
-    """The gains of both laws, as one named set."""
+    """The gains of both laws, as one named set; `origin` says where they come from."""
 
-    asg_ism: AsgIsmGains = Field(default_factory=AsgIsmGains, description="gains of asg-ism")
-    pid: PidGains = Field(default_factory=PidGains, description="gains of pid")
+    asg_ism: AsgIsmGains = Field(description="gains of asg-ism")
+    pid: PidGains = Field(description="gains of pid")
+    origin: dict[str, str | int | float] = Field(
+        default_factory=dict, description="procedure, budget, seed, cost, revision; or the source"
+    )
+
+
+class GainSets(Section):
+    """The named sets of hil/data/gains; values given in a scenario are laid over those files."""
+
+    tuned: Gains = Field(description="found by `hil.tune`, the same budget for both laws")
+    thesis: Gains = Field(description="table 8.2 as read in docs/control.md")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _over_files(cls, given: object) -> object:
+        if not isinstance(given, dict):
+            return given
+        known = {name: read_gain_set(name) for name in cls.model_fields}
+        return _laid_over(known, given)
+
+    @classmethod
+    def from_files(cls) -> GainSets:
+        """Return the sets as they ship."""
+        return cls.model_validate({})
+
+
+def read_gain_set(name: str) -> dict[str, Any]:
+    """Return the tables of a gain file that ships with the package."""
+    text = (files("hil") / "data" / "gains" / f"{name}.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
+def _laid_over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    """Return `below` with the keys of `above` over it, table by table."""
+    result = dict(below)
+    for key, value in above.items():
+        old = result.get(key)
+        both = isinstance(old, dict) and isinstance(value, dict)
+        result[key] = _laid_over(old, value) if both else value
+    return result
 
 
 class EstimatorConfig(Section):
@@ -166,7 +208,13 @@ class ControlConfig(Section):
     outer: OuterLawName = Field("asg-ism", description="outer law")
     estimator: EstimatorName = Field("fused", description="state estimator")
     limits: OuterLimits = Field(default_factory=OuterLimits, description="restrictions, both laws")
-    gains: Gains = Field(default_factory=Gains, description="gains of both laws")
+    gain_set: GainSetName = Field("tuned", description="set of gains in use")
+    gains: GainSets = Field(default_factory=GainSets.from_files, description="the named sets")
     fusion: EstimatorConfig = Field(
         default_factory=EstimatorConfig, description="what the estimator assumes"
     )
+
+    @property
+    def active_gains(self) -> Gains:
+        """Return the gains in use."""
+        return self.gains.tuned if self.gain_set == "tuned" else self.gains.thesis
