@@ -47,6 +47,7 @@ class BoardClock:
         self._window: deque[_Exchange] = deque(maxlen=window)
         self._rtt_limit_s = rtt_limit_s
         self._last_us = 0
+        self.exchanges = 0
         self.refused = 0
         self.restarts = 0
         self._forget()
@@ -94,6 +95,7 @@ class BoardClock:
         self._last_us = max(self._last_us, unwrapped_us) if self.ready else unwrapped_us
         self._window.append(_Exchange(unwrapped_us, mid_s, rtt_s))
         self.rtt_s = rtt_s
+        self.exchanges += 1
         self._fit()
         return True
 

@@ -47,7 +47,7 @@ def test_speed_is_that_of_the_centre_of_mass():
 
 
 def test_a_standard_client_sees_vehicle_and_pose():
-    """pymavlink's own UDP client finds an armed rover and reads its position and attitude."""
+    """Pymavlink's own UDP client finds an armed rover and reads its position and attitude."""
     client = mavutil.mavlink_connection("udpin:127.0.0.1:0", dialect="common")
     port = client.port.getsockname()[1]
     bridge = UdpBridge(f"127.0.0.1:{port}")

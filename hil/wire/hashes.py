@@ -1,0 +1,34 @@
+"""The two hashes of the arming handshake, as the host computes them (firmware: wire.h, params.h)."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Mapping
+
+from hil.wire import dialect
+
+_ENTRY = struct.Struct("<IBB")
+_PARAMETER = struct.Struct("<16sf")
+
+
+def dialect_hash() -> int:
+    """Return CRC-32 over (message id, CRC_EXTRA, payload length) in order of message id.
+
+    CRC_EXTRA covers names and types of message and fields; ids and lengths cover the rest.
+    """
+    return zlib.crc32(
+        b"".join(
+            _ENTRY.pack(msg_id, message.crc_extra, message.unpacker.size)
+            for msg_id, message in sorted(dialect.mavlink_map.items())
+        )
+    )
+
+
+def parameter_hash(parameters: Mapping[str, float]) -> int:
+    """Return the sum modulo 2^32 of CRC-32 over each zero-padded name and its float32 value."""
+    terms = (
+        zlib.crc32(_PARAMETER.pack(name.encode(), value + 0.0))  # no negative zero
+        for name, value in parameters.items()
+    )
+    return sum(terms) & 0xFFFF_FFFF
