@@ -1,0 +1,180 @@
+"""The gain procedure: one search, one cost and one budget for both outer laws (docs/control.md).
+
+The caller says how a candidate is run (`evaluate`), so the procedure works on any target. Gains are
+searched on a logarithmic scale by CMA-ES; every candidate of both laws sees the same scenarios and
+the same seeds, and both laws get the same population and the same number of candidates.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from hil.config.control import Gains
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+Figures = Mapping[str, float]
+# (outer law, gains, scenario, seed) -> figures of the run, named as in metrics.json
+Evaluate = Callable[[str, Gains, str, int], Figures]
+# (outer law, candidates done, candidates in all, best cost so far)
+Progress = Callable[[str, int, int, float], None]
+
+# A run's cost is the sum of weight * figure: the error, weighted by time so that a rest error
+# counts, and the variation of the commands (chatter), at about a tenth of the whole in a calm run.
+COST_WEIGHTS = {"itae_m_s2": 1.0, "eta1_variation_m_s": 0.5, "theta_dot_variation_rad_s": 0.05}
+# Cost of a run that gives no figure: a safety stop, or a law that diverged.
+COST_FAILED = 100.0
+
+# Per law, the gains searched with their bounds, and the start: poles at -1, -2, -3 for both laws
+# (inside its layer the sliding stage has the pole -alpha/eps).
+SEARCH: dict[str, dict[str, tuple[float, float, float]]] = {
+    "asg-ism": {
+        "k1_s": (0.2, 1.0, 5.0),
+        "k2_s": (0.5, 3.0, 20.0),
+        "alpha_m_s3": (0.01, 1.0, 30.0),
+        "eps0_m_s2": (1e-3, 0.5, 5.0),
+        "eps_min_m_s2": (0.01, 0.5, 5.0),
+        "mu0_s": (0.1, 1.0, 30.0),
+        "sigma_m_s2": (1e-5, 0.01, 1.0),
+    },
+    "pid": {
+        "kp_s3": (0.3, 6.0, 200.0),
+        "ki_s4": (1e-4, 0.01, 20.0),
+        "kd1_s2": (1.0, 11.0, 200.0),
+        "kd2_s": (1.0, 6.0, 40.0),
+    },
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What both laws are given alike."""
+
+    scenarios: tuple[str, ...]
+    seeds: tuple[int, ...]
+    candidates: int = 300
+    population: int = 10
+    search_seed: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """The best candidate of one law."""
+
+    values: dict[str, float]
+    cost: float
+    start_cost: float
+    candidates: int
+
+
+def run_cost(figures: Figures) -> float:
+    """Return the cost of one run; COST_FAILED at most, also where a figure is missing or NaN."""
+    cost = sum(weight * figures.get(name, math.nan) for name, weight in COST_WEIGHTS.items())
+    return min(cost, COST_FAILED) if math.isfinite(cost) else COST_FAILED
+
+
+def candidate_cost(outer: str, gains: Gains, evaluate: Evaluate, plan: Plan) -> float:
+    """Return the mean cost over every scenario and seed of the plan."""
+    costs = [
+        run_cost(evaluate(outer, gains, scenario, seed))
+        for scenario in plan.scenarios
+        for seed in plan.seeds
+    ]
+    return sum(costs) / len(costs)
+
+
+def decode(outer: str, point: Sequence[float]) -> dict[str, float]:
+    """Return the gains at a point of the unit cube, to four digits (as the file will hold them)."""
+    return {
+        name: float(f"{low * (high / low) ** min(max(u, 0.0), 1.0):.4g}")
+        for (name, (low, _, high)), u in zip(SEARCH[outer].items(), point, strict=True)
+    }
+
+
+def with_values(base: Gains, outer: str, values: Mapping[str, float]) -> Gains:
+    """Return `base` with the searched gains of one law replaced."""
+    table = outer.replace("-", "_")
+    tree = base.model_dump()
+    tree[table].update(values)
+    return Gains.model_validate(tree)
+
+
+def search(
+    outer: str, base: Gains, evaluate: Evaluate, plan: Plan, progress: Progress | None = None
+) -> Found:
+    """Return the best gains of `outer` within the plan's budget; deterministic by its seeds."""
+    import cma  # noqa: PLC0415 - slow import, needed by this function alone
+
+    start = [
+        math.log(middle / low) / math.log(high / low)
+        for low, middle, high in SEARCH[outer].values()
+    ]
+    options = {
+        "bounds": [0.0, 1.0],
+        "popsize": plan.population,
+        "seed": plan.search_seed,
+        "verbose": -9,
+    }
+    strategy = cma.CMAEvolutionStrategy(start, 0.15, options)
+    values = decode(outer, start)
+    start_cost = candidate_cost(outer, with_values(base, outer, values), evaluate, plan)
+    best = (start_cost, values)
+    done = 1
+    while done + plan.population <= plan.candidates:
+        points = strategy.ask()
+        costs = []
+        for point in points:
+            values = decode(outer, point)
+            costs.append(candidate_cost(outer, with_values(base, outer, values), evaluate, plan))
+            best = min(best, (costs[-1], values), key=lambda item: item[0])
+            done += 1
+            if progress is not None:
+                progress(outer, done, plan.candidates, best[0])
+        strategy.tell(points, costs)
+    return Found(best[1], best[0], start_cost, done)
+
+
+def tune(
+    base: Gains,
+    evaluate: Evaluate,
+    plan: Plan,
+    *,
+    target: str,
+    revision: str,
+    progress: Progress | None = None,
+) -> Gains:
+    """Return the tuned gains of both laws with their origin; `base` holds what is not searched."""
+    found = {outer: search(outer, base, evaluate, plan, progress) for outer in SEARCH}
+    gains = base
+    origin: dict[str, Any] = {
+        "procedure": "hil.tune: CMA-ES on log gains, see docs/control.md",
+        "target": target,
+        "revision": revision,
+        "scenarios": ", ".join(plan.scenarios),
+        "seeds": ", ".join(map(str, plan.seeds)),
+        "population": plan.population,
+        "search_seed": plan.search_seed,
+        "cost": " + ".join(f"{weight:g} {name}" for name, weight in COST_WEIGHTS.items()),
+    }
+    for outer, result in found.items():
+        gains = with_values(gains, outer, result.values)
+        origin[f"candidates_{outer}"] = result.candidates
+        origin[f"cost_{outer}"] = round(result.cost, 4)
+        origin[f"start_cost_{outer}"] = round(result.start_cost, 4)
+    return gains.model_copy(update={"origin": origin})
+
+
+def write_gain_set(path: Path, gains: Gains) -> None:
+    """Write a gain file as hil/data/gains holds them."""
+    lines = ["# Written by hil.tune; not edited by hand."]
+    for table, values in gains.model_dump().items():
+        lines += ["", f"[{table}]"]
+        lines += [
+            f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value!r}"
+            for key, value in values.items()
+        ]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
