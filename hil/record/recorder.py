@@ -42,7 +42,7 @@ class Recorder:
         *,
         record_camera: bool = False,
         frame_rate_hz: float = 30.0,
-        rerun: bool = False,
+        rerun: bool = True,
     ) -> None:
         self.path = out_dir
         self._manifest = manifest
@@ -96,6 +96,17 @@ class Recorder:
         """Append one line of what happened: arming, stop, fault, disturbance, board's text."""
         line = json.dumps({"t_s": t_s, "kind": kind, "text": text}, ensure_ascii=False)
         self._events.write(line + "\n")
+
+    def identify(self, dialect_hash: str, parameter_hash: str, firmware_build_id: str) -> None:
+        """Put into the manifest who the board said it is."""
+        self._manifest = self._manifest.model_copy(
+            update={
+                "dialect_hash": dialect_hash,
+                "parameter_hash": parameter_hash,
+                "firmware_build_id": firmware_build_id,
+            }
+        )
+        write_manifest(self.path, self._manifest)
 
     def flush(self) -> None:
         """Hand everything so far to the system."""
