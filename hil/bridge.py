@@ -117,11 +117,10 @@ class UdpBridge:
 
 
 def _heartbeat(armed: bool) -> common.MAVLink_message:
-    mode = common.MAV_MODE_FLAG_HIL_ENABLED | common.MAV_MODE_FLAG_GUIDED_ENABLED
     return common.MAVLink_heartbeat_message(
         common.MAV_TYPE_GROUND_ROVER,
         common.MAV_AUTOPILOT_GENERIC,
-        mode | (common.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0),
+        common.MAV_MODE_FLAG_GUIDED_ENABLED | (common.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0),
         0,
         common.MAV_STATE_ACTIVE if armed else common.MAV_STATE_STANDBY,
         3,

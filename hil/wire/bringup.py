@@ -12,9 +12,8 @@ from collections.abc import Callable, Generator, Mapping
 
 from hil.errors import RigFault
 from hil.targets.base import Rig
-from hil.wire import dialect
+from hil.wire import dialect, identity
 from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM
-from hil.wire.hashes import dialect_hash, parameter_hash
 from hil.wire.link import BoardLink, Procedure
 
 # Opening the port of an Arduino resets it; its boot loader holds it for up to 2 s.
@@ -54,9 +53,10 @@ def connect(link: BoardLink, parameters: Mapping[str, float]) -> Procedure:
 
 
 def _check_dialect(link: BoardLink) -> None:
-    if link.info.dialect_hash != dialect_hash():
+    own = identity.dialect_hash()
+    if link.info.dialect_hash != own:
         raise RigFault(
-            f"board: speaks dialect {link.info.dialect_hash:08x}, this host {dialect_hash():08x}; "
+            f"board: speaks dialect {link.info.dialect_hash:08x}, this host {own:08x}; "
             "upload the firmware of this version (hil firmware upload)"
         )
 
@@ -132,7 +132,7 @@ def set_parameter(link: BoardLink, name: str, value: float) -> Procedure:
         )
 
 
-def arm(link: BoardLink) -> Procedure:
+def arm(link: BoardLink, dialect_hash: int, parameter_hash: int) -> Procedure:
     """Arm: present both hashes as computed on this side; the board compares them with its own.
 
     Set-points must follow within the board's time-out, or it goes to SAFE.
@@ -143,8 +143,8 @@ def arm(link: BoardLink) -> Procedure:
         dialect.MAV_CMD_COMPONENT_ARM_DISARM,
         1.0,
         0.0,
-        *_halves(dialect_hash()),
-        *_halves(parameter_hash(link.parameters)),
+        *_halves(dialect_hash),
+        *_halves(parameter_hash),
     )
 
 

@@ -32,3 +32,8 @@ def parameter_hash(parameters: Mapping[str, float]) -> int:
         for name, value in parameters.items()
     )
     return sum(terms) & 0xFFFF_FFFF
+
+
+def board_hashes(parameters: Mapping[str, float]) -> tuple[int, int]:
+    """Return (dialect hash, parameter hash) that a board with these parameters must show."""
+    return dialect_hash(), parameter_hash(parameters)
