@@ -1,4 +1,7 @@
-"""Disturbances and faults: timed, seeded scenario data. Times count from the start of the run."""
+"""Disturbances and faults: timed, seeded scenario data. Times count from the controlled part's begin.
+
+Exchanged colour marks are no event but a property of the robot: `camera.marks.swapped_marks`.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +39,6 @@ FaultKind = Literal[
     "link_cut",  # nothing passes either way
     "camera_stall",  # no frames
     "camera_occluded",  # robot hidden from the camera
-    "marks_swapped",  # front and rear colour marks exchanged
 ]
 SIDED = {
     "dead_encoder",
@@ -82,7 +84,7 @@ class Disturbance(Section):
 
 
 class Fault(Section):
-    """One fault in force from `start_s` to `end_s`."""
+    """One fault in force from `start_s` to `end_s`; with `start_s` 0 it is there from power-up on."""
 
     kind: FaultKind
     side: Literal["left", "right", "both"] = Field("both", description="of encoders and motors")

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from typing import Self
+
+from pydantic import Field, model_validator
 
 from hil.config.base import Section
 
 
 class LinkConfig(Section):
-    """Both directions alike; delay of one chunk is latency + jitter * u, u uniform in 0..1."""
+    """Both directions alike; delay of one chunk is latency + jitter * u, u uniform in -1..1.
+
+    Chunks never overtake each other and never arrive before they were sent.
+    """
 
     baud: int = Field(
         57_600, ge=1_200, le=2_000_000, description="bit/s, 10 bits a byte; the HC-05 of the thesis"
     )
     latency_s: float = Field(
-        0.020, ge=0, le=2, description="least delay of a chunk, s; serial Bluetooth, assumed"
+        0.020, ge=0, le=2, description="mean delay of a chunk, s; serial Bluetooth, assumed"
     )
     latency_jitter_s: float = Field(
-        0.010, ge=0, le=2, description="largest extra delay of a chunk, s; assumed"
+        0.010, ge=0, le=2, description="half width of the delay's spread, s; assumed"
     )
     loss_ratio: float = Field(0.0, ge=0, le=0.9, description="mean share of chunks lost")
     loss_burst_chunks: float = Field(
@@ -26,3 +31,11 @@ class LinkConfig(Section):
     corruption_ratio: float = Field(
         0.0, ge=0, le=0.5, description="share of bytes that arrive with other bits"
     )
+
+    @model_validator(mode="after")
+    def _bursts_long_enough(self) -> Self:
+        """Between two bursts one chunk passes at least, which bounds the loss from above."""
+        least = self.loss_ratio / (1.0 - self.loss_ratio)
+        if self.loss_burst_chunks < least:
+            raise ValueError(f"loss_burst_chunks must be at least {least:.3g} at this loss_ratio")
+        return self

@@ -23,7 +23,9 @@ class MotorConfig(Section):
     emf_constant_v_s_rad: float = Field(gt=0, le=1, description="k_b, V s per rad at the rotor")
     gear_ratio: float = Field(ge=1, le=500, description="N, rotor turns for one wheel turn")
     gear_efficiency_ratio: float = Field(gt=0, le=1, description="eta_g, share of torque passed on")
-    rotor_inertia_kg_m2: float = Field(ge=0, le=1e-3, description="inertia of the rotor, rotor side")
+    rotor_inertia_kg_m2: float = Field(
+        ge=0, le=1e-3, description="inertia of the rotor, rotor side"
+    )
     coulomb_n_m: float = Field(ge=0, le=2, description="friction torque while turning")
     stiction_n_m: float = Field(ge=0, le=2, description="friction torque just before turning")
     stribeck_rad_s: float = Field(gt=0, le=20, description="speed at which half the excess is gone")
@@ -39,7 +41,9 @@ class MotorConfig(Section):
 class BridgeConfig(Section):
     """H-bridge channel; the voltage it drops opposes the channel's current."""
 
-    drop_v: float = Field(ge=0, le=5, description="part of the drop that does not depend on current")
+    drop_v: float = Field(
+        ge=0, le=5, description="part of the drop that does not depend on current"
+    )
     resistance_ohm: float = Field(ge=0, le=10, description="rise of the drop with channel current")
     smoothing_a: float = Field(ge=0.05, le=5, description="current over which the drop builds up")
 
@@ -48,7 +52,9 @@ class BatteryConfig(Section):
     """Open-circuit voltage straight in the charge, behind one resistance."""
 
     full_v: float = Field(gt=0, le=60, description="open-circuit voltage at charge 1")
-    empty_v: float = Field(gt=0, le=60, description="open-circuit voltage at charge 0 (of the line)")
+    empty_v: float = Field(
+        gt=0, le=60, description="open-circuit voltage at charge 0 (of the line)"
+    )
     capacity_a_h: float = Field(gt=0, le=100, description="charge from full to empty")
     resistance_ohm: float = Field(ge=0, le=5, description="cells, plug and leads")
     charge_start_ratio: float = Field(gt=0, le=1, description="charge when the run begins")
@@ -76,7 +82,9 @@ class RobotConfig(Section):
         description="constrained: eta2 = -d0 theta_dot (2.31) and rolling wheels; slip: neither"
     )
     mass_kg: float = Field(ge=0.5, le=50, description="m")
-    inertia_kg_m2: float = Field(ge=0.002, le=10, description="I about the vertical through the centre")
+    inertia_kg_m2: float = Field(
+        ge=0.002, le=10, description="I about the vertical through the centre"
+    )
     wheel_radius_m: float = Field(ge=0.01, le=0.5, description="r")
     track_m: float = Field(ge=0.05, le=2, description="W, distance of left and right wheels")
     front_axle_m: float = Field(ge=0.01, le=2, description="a_f, centre of mass to front axle")

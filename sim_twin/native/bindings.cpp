@@ -1,4 +1,4 @@
-// Python module sim_twin._native: plant, kernel and (render.cpp) the camera renderer.
+// Python module sim_twin._native: plant, kernel and (render_bind.cpp) the camera renderer.
 // Signatures and units for Python readers: sim_twin/_native.pyi.
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/array.h>
@@ -14,7 +14,7 @@
 namespace nb = nanobind;
 using namespace nb::literals;
 
-void bind_render(nb::module_& m);  // render.cpp
+void bind_render(nb::module_& m);  // render_bind.cpp
 
 namespace {
 
@@ -158,6 +158,7 @@ void bind_kernel(nb::module_& m) {
              k.add_fault({static_cast<twin::FaultKind>(kind), left, right, start_s, end_s});
            },
            "kind"_a, "left"_a, "right"_a, "start_s"_a, "end_s"_a)
+      .def("begin", &Kernel::begin, "t_us"_a)
       .def("advance", &Kernel::advance, "t_us"_a)
       .def("receive",
            [](Kernel& k, std::int64_t t_us, nb::bytes data) {

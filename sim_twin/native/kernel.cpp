@@ -65,6 +65,7 @@ void Kernel::reset(double x_m, double y_m, double theta_rad) {
   plant_.reset(x_m, y_m, theta_rad);
   for (Encoder& encoder : encoders_) encoder.reset(0.0);
   time_us_ = 0;
+  begin_us_ = kNever_us;
   pose_count_ = 0;
   drive_ = {};
   battery_v_ = plant_.battery_v(drive_, 0.0);
@@ -106,12 +107,15 @@ void Kernel::set_drive() {
   drive_.jam_right = fault_.side[1].stuck ? kJam_n_m_s_rad : 0.0;
 }
 
-void Kernel::integrate(double t_s, double h_s) {
-  if (disturbances_.empty()) {
+void Kernel::integrate() {
+  const double h_s = 1e-6 * static_cast<double>(options_.step_us);
+  sag_v_ = 0.0;
+  if (disturbances_.empty() || time_us_ < begin_us_) {
     constexpr LoadVector kNone{};
     plant_.step(h_s, drive_, kNone, kNone, kNone);
     return;
   }
+  const double t_s = 1e-6 * static_cast<double>(time_us_ - begin_us_);
   // Zones are looked up at the pose where the step begins: 0.1 mm at most.
   const double x_m = plant_.state()[kX], y_m = plant_.state()[kY];
   const LoadVector end = disturbances_.loads(t_s + h_s, x_m, y_m);
@@ -124,11 +128,12 @@ void Kernel::step() {
   const auto t0_us = static_cast<double>(time_us_);
   const auto h_us = static_cast<double>(options_.step_us);
   if (!faults_.empty()) {
-    fault_ = faults_.at(1e-6 * t0_us);
+    const std::int64_t since_us = std::max<std::int64_t>(time_us_ - begin_us_, 0);
+    fault_ = faults_.at(1e-6 * static_cast<double>(since_us));
     follow_reset_line();
   }
   set_drive();
-  integrate(1e-6 * t0_us, 1e-6 * h_us);
+  integrate();
   const StateVector& x = plant_.state();
   edges_.clear();
   for (int side = 0; side < 2; ++side) {

@@ -52,6 +52,8 @@ class Kernel {
   void reset(double x_m, double y_m, double theta_rad);
   void add_disturbance(const Disturbance& d) { disturbances_.add(d); }
   void add_fault(const Fault& f) { faults_.add(f); }
+  // Event times count from t_us. Before it there are no disturbances, and the faults of time 0.
+  void begin(std::int64_t t_us) { begin_us_ = t_us; }
 
   // Run until t_us is reached, or to the end of the step in which the board has sent something.
   // Returns the time reached. Throws when the state is no longer finite.
@@ -60,7 +62,7 @@ class Kernel {
   std::vector<Chunk> take_sent();
 
   std::int64_t time_us() const { return time_us_; }
-  // Pose at a time in the last two seconds, straight lines between samples 1 ms apart.
+  // Pose at a time in the last four seconds, straight lines between samples 1 ms apart.
   PoseSample pose_at(double t_us) const;
   const StateVector& state() const { return plant_.state(); }
   double battery_v() const { return battery_v_; }
@@ -71,11 +73,12 @@ class Kernel {
   void step();
   void follow_reset_line();
   void set_drive();
-  void integrate(double t_s, double h_s);
+  void integrate();
   void remember();
 
+  static constexpr std::int64_t kNever_us = std::int64_t{1} << 60;
   static constexpr std::int64_t kPoseSpacing_us = 1000;
-  static constexpr std::size_t kPoses = 2048;
+  static constexpr std::size_t kPoses = 4096;
 
   Plant plant_;
   KernelOptions options_;
@@ -89,6 +92,7 @@ class Kernel {
   std::array<PoseSample, kPoses> poses_{};
   std::int64_t pose_count_ = 0;
   std::int64_t time_us_ = 0;
+  std::int64_t begin_us_ = kNever_us;
   double sag_v_ = 0.0;
   double battery_v_ = 0.0;
   bool board_held_ = false;

@@ -1,0 +1,254 @@
+"""Robot model, lockstep kernel and camera renderer, compiled from sim_twin/native.
+
+SI units. World X right, Y up; body x forward, y left; theta counter-clockwise. Left is 0, right 1.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+PARAMETERS: tuple[str, ...]
+"""Names of the attributes of PlantParams besides `slip`."""
+STATES: tuple[str, ...]
+"""Names of the entries of Plant.state and Kernel.state()."""
+LOADS: tuple[str, ...]
+"""Targets of disturbances, by number."""
+SHAPES: tuple[str, ...]
+"""Shapes of disturbances, by number."""
+FAULTS: tuple[str, ...]
+"""Kinds of faults of robot and board, by number."""
+
+Zone = tuple[float, float, float]
+"""World X, Y and radius in m; radius 0 is everywhere."""
+
+class PlantParams:
+    """Parameters of the robot model; the names in PARAMETERS, all floats, all 0 at first."""
+
+    slip: bool
+    def __setattr__(self, name: str, value: float, /) -> None: ...
+    def __getattr__(self, name: str, /) -> float: ...
+
+class Plant:
+    """The robot alone: bridge duty in, motion out."""
+
+    state: Sequence[float]
+    def __init__(self, params: PlantParams) -> None: ...
+    def reset(self, x_m: float, y_m: float, theta_rad: float) -> None:
+        """Put it at rest at a pose with the battery's start charge."""
+    def step(
+        self, h_s: float, duty_left: float, duty_right: float, loads: Sequence[float]
+    ) -> None:
+        """Take one RK4 step with duty (-1..1) and loads (in the order of LOADS) held."""
+    def run(
+        self, steps: int, h_s: float, duty_left: float, duty_right: float, loads: Sequence[float]
+    ) -> None:
+        """Take many such steps."""
+    def derivative(
+        self, duty_left: float, duty_right: float, loads: Sequence[float]
+    ) -> list[float]:
+        """Return the time derivative of the state."""
+    def battery_v(self, duty_left: float, duty_right: float) -> float:
+        """Return the battery's terminal voltage at these duties and the present currents."""
+
+class Encoder:
+    """One two-channel encoder; angle 0 at first."""
+
+    def __init__(self, counts_per_turn: int) -> None: ...
+    def move(
+        self,
+        angle_rad: float,
+        t0_us: float,
+        h_us: float,
+        dead_a: bool = False,
+        dead_b: bool = False,
+        swapped: bool = False,
+    ) -> list[tuple[float, int]]:
+        """Turn evenly to `angle_rad` in `h_us`; return (time, (A << 1) | B) of every edge."""
+
+def disturbance_value(
+    shape: int,
+    amplitude: float,
+    start_s: float,
+    end_s: float,
+    frequency_hz: float,
+    phase_rad: float,
+    seed: int,
+    zone: Zone,
+    t_s: float,
+    x_m: float,
+    y_m: float,
+) -> float:
+    """Return what a disturbance adds at a time and place."""
+
+class Kernel:
+    """Robot and board in lockstep; its clock counts whole microseconds from reset."""
+
+    def __init__(
+        self,
+        params: PlantParams,
+        step_us: int,
+        counts_per_turn: int,
+        clock_ppm: float,
+        clock_start_us: int,
+        baud: float,
+    ) -> None: ...
+    def reset(self, x_m: float, y_m: float, theta_rad: float) -> None:
+        """Put the robot at rest at a pose, switch the board on, set the clock to zero."""
+    def add_disturbance(
+        self,
+        load: int,
+        shape: int,
+        amplitude: float,
+        start_s: float,
+        end_s: float,
+        frequency_hz: float,
+        phase_rad: float,
+        seed: int,
+        zone: Zone,
+    ) -> None:
+        """Add a disturbance; times count from `begin`."""
+    def add_fault(
+        self, kind: int, left: bool, right: bool, start_s: float, end_s: float
+    ) -> None:
+        """Add a fault; times count from `begin`, and one with start 0 is there before it too."""
+    def begin(self, t_us: int) -> None:
+        """Let the times of disturbances and faults count from `t_us`."""
+    def advance(self, t_us: int) -> int:
+        """Run to `t_us`, or to the end of the step in which the board sent; return the time.
+
+        Raises RuntimeError when the state is not finite any more.
+        """
+    def receive(self, t_us: int, data: bytes) -> None:
+        """Let bytes reach the board's UART, the last one at `t_us`; in time order."""
+    def take_sent(self) -> list[tuple[int, bytes]]:
+        """Return what left the board's UART: time of the last byte in us, and the bytes."""
+    def pose_at(self, t_us: float) -> tuple[float, float, float]:
+        """Return X, Y, theta at a time of the last four seconds; raises IndexError outside."""
+    def state(self) -> tuple[float, ...]:
+        """Return the state now, in the order of STATES."""
+    @property
+    def time_us(self) -> int:
+        """Kernel time."""
+    @property
+    def battery_v(self) -> float:
+        """Terminal voltage of the battery."""
+    @property
+    def duty(self) -> tuple[float, float]:
+        """Share of the battery voltage on the left and right motors, -1..1."""
+    @property
+    def true_counts(self) -> tuple[int, int]:
+        """Encoder counts of the left and right wheel as a sound encoder would show them."""
+
+# The renderer (render_bind.cpp). Lengths in m, sizes in px, colours (blue, green, red).
+
+_Colour = Sequence[float]
+
+class View:
+    """Size, lens and pose of the camera."""
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    dist: Sequence[float]
+    R: Sequence[float]
+    t: Sequence[float]
+
+class Patch:
+    """Disc or rectangle on the robot's plate."""
+
+    disc: bool
+    mark: bool
+    x: float
+    y: float
+    half_x: float
+    half_y: float
+    colour: _Colour
+
+class Grid:
+    """Square grid of black and white cells on the plate."""
+
+    cells: int
+    x: float
+    y: float
+    half: float
+    margin: float
+    white: Sequence[int]
+
+class Block:
+    """Box or flat disc on the floor."""
+
+    disc: bool
+    x: float
+    y: float
+    half_x: float
+    half_y: float
+    theta: float
+    top: float
+    colour: _Colour
+
+class Bar:
+    """Straight bar above the robot."""
+
+    body: bool
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+    half_width: float
+    z: float
+    colour: _Colour
+
+class Robot:
+    """What the camera sees of the robot."""
+
+    half_length: float
+    half_width: float
+    bottom: float
+    top: float
+    wheel_radius: float
+    wheel_half_width: float
+    half_track: float
+    half_base: float
+    plate: _Colour
+    side: _Colour
+    tyre: _Colour
+    hub: _Colour
+    patches: Sequence[Patch]
+    tag: Grid
+
+class Scene:
+    """Floor, light and sensor."""
+
+    floor: _Colour
+    blocks: Sequence[Block]
+    bars: Sequence[Bar]
+    white_balance: _Colour
+    blur: float
+    read_noise: float
+    dn_per_electron: float
+    lamp_x: float
+    lamp_y: float
+    shade: float
+    def set_texture(self, image: NDArray[np.float32], step: float) -> None:
+        """Set the floor's reflectance factor, periodic, `step` m per px."""
+    def set_light(self, light: NDArray[np.float32], glare: NDArray[np.float32]) -> None:
+        """Set DN of a white surface and DN added, per pixel."""
+
+class Renderer:
+    """Draws frames of one scene from one view."""
+
+    def __init__(self, view: View, scene: Scene, robot: Robot, seed: int) -> None: ...
+    def make(
+        self, index: int, poses: Sequence[tuple[float, float, float]]
+    ) -> NDArray[np.uint8]:
+        """Return frame `index`, (height, width, 3) BGR; no poses: the empty scene."""
+
+def floor_map(view: View) -> NDArray[np.float64]:
+    """Return world (X, Y) on the floor seen by every pixel, (height, width, 2)."""
+
+def project(view: View, x: float, y: float, z: float) -> list[float]:
+    """Return the pixel (u, v) of a world point; raises ValueError behind the camera."""

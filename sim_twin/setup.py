@@ -1,0 +1,83 @@
+"""Turns the configuration of robot, disturbances and faults into the native kernel's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from random import Random
+from typing import TYPE_CHECKING
+
+from sim_twin import _native
+
+if TYPE_CHECKING:
+    from hil.config.events import Disturbance, Fault
+    from hil.config.robot import RobotConfig
+
+STEP_US = 100  # RK4 at 1e-4 s (control.md section 2)
+_GROUPS = ("motor", "bridge", "battery", "floor")
+
+
+def plant_params(robot: RobotConfig) -> _native.PlantParams:
+    """Return the plant's parameters: `motor.resistance_ohm` is `motor_resistance_ohm` there."""
+    params = _native.PlantParams()
+    for name in _native.PARAMETERS:
+        group, _, rest = name.partition("_")
+        owner = getattr(robot, group) if group in _GROUPS else robot
+        setattr(params, name, float(getattr(owner, rest if group in _GROUPS else name)))
+    params.slip = robot.variant == "slip"
+    return params
+
+
+def make_kernel(
+    robot: RobotConfig,
+    baud: int,
+    rng: Random,
+    disturbances: Sequence[Disturbance] = (),
+    faults: Sequence[Fault] = (),
+) -> _native.Kernel:
+    """Return robot and board at rest at the origin, with every event of the scenario loaded.
+
+    `rng` draws what nobody sets: when the board was switched on, and the noise.
+    """
+    kernel = _native.Kernel(
+        plant_params(robot),
+        step_us=STEP_US,
+        counts_per_turn=robot.encoder_counts_per_turn,
+        clock_ppm=robot.board_clock_ppm,
+        clock_start_us=rng.randrange(2_000_000, 600_000_000),
+        baud=float(baud),
+    )
+    noise_seed = rng.getrandbits(32) << 32
+    for item in disturbances:
+        kernel.add_disturbance(_native.LOADS.index(item.target), *shape_arguments(item, noise_seed))
+    for fault in faults:
+        if fault.kind in _native.FAULTS:
+            kernel.add_fault(
+                _native.FAULTS.index(fault.kind),
+                fault.side != "right",
+                fault.side != "left",
+                fault.start_s,
+                _end_s(fault.end_s),
+            )
+    return kernel
+
+
+def shape_arguments(
+    item: Disturbance, noise_seed: int
+) -> tuple[int, float, float, float, float, float, int, tuple[float, float, float]]:
+    """Return the arguments of `_native.disturbance_value` that describe one disturbance."""
+    zone = item.zone
+    return (
+        _native.SHAPES.index(item.shape),
+        item.amplitude,
+        item.start_s,
+        _end_s(item.end_s),
+        item.frequency_hz,
+        item.phase_rad,
+        noise_seed | item.seed,
+        (zone.x_m, zone.y_m, zone.radius_m) if zone else (0.0, 0.0, 0.0),
+    )
+
+
+def _end_s(end_s: float | None) -> float:
+    return math.inf if end_s is None else end_s

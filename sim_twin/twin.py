@@ -1,0 +1,215 @@
+"""The simulated rig: robot, board, link and camera in lockstep on a virtual host clock.
+
+Twin stands in at the byte stream and at the camera frame (`hil.targets.base.Rig`). Time moves only
+in `wait`; nothing here reads a real clock. Host time is virtual time + HOST_START_S.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from random import Random
+from typing import TYPE_CHECKING, Protocol
+
+from hil.errors import RigFault
+from hil.targets.base import Frame, Truth
+from hil.types import Pose
+from sim_twin.drawn_poses import DrawnPoses, PoseTuple, load_localiser_error
+from sim_twin.link_model import Channel, Serialiser
+from sim_twin.setup import make_kernel
+from sim_twin.shutter import Exposure, Shutter, Span
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from hil.config.camera import CameraConfig
+    from hil.config.events import Disturbance, Fault
+    from hil.config.link import LinkConfig
+    from hil.config.robot import RobotConfig
+    from hil.targets.base import ByteStream
+
+# No clock of a real rig starts at zero; whoever mixes up host, board and camera time shall notice.
+HOST_START_S = 1000.0
+# Poses handed to the renderer over one exposure: 0.6 mm apart at 0.5 m/s and 6 ms.
+POSES_PER_EXPOSURE = 5
+
+
+class FrameMaker(Protocol):
+    """Draws frames; see `sim_twin.camera_sim.RenderedCamera`."""
+
+    def make(self, index: int, poses: Sequence[PoseTuple]) -> NDArray[np.uint8]:
+        """Return the image of frame `index`; no poses: the robot is not to be seen."""
+
+
+@dataclass(frozen=True, slots=True)
+class TwinSetup:
+    """All that the simulated rig is made of; `start` is the robot's pose at rest."""
+
+    robot: RobotConfig
+    link: LinkConfig
+    camera: CameraConfig
+    start: Pose
+    seed: int
+    disturbances: tuple[Disturbance, ...] = ()
+    faults: tuple[Fault, ...] = ()
+
+
+class TwinStream:
+    """Host end of the link: a serial port at the link's baud rate with a radio behind it."""
+
+    def __init__(self, twin: Twin, baud: int, down: Channel, arrived: list[bytes]) -> None:
+        self._twin = twin
+        self._port = Serialiser(baud)
+        self._down = down
+        self._arrived = arrived
+
+    def read(self) -> bytes:
+        """Return every byte that has arrived by now, b"" if none."""
+        if not self._arrived:
+            return b""
+        data = b"".join(self._arrived)
+        self._arrived.clear()
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Send the bytes towards the board."""
+        carried = self._down.carry(self._port.send(self._twin.now_s(), len(data)), data)
+        if carried is not None:
+            self._twin.deliver_to_board(*carried)
+
+
+class Twin:
+    """One simulated rig; `maker` None gives drawn poses in place of images."""
+
+    stream: ByteStream
+
+    def __init__(self, setup: TwinSetup, maker: FrameMaker | None = None) -> None:
+        def rng(part: str) -> Random:
+            return Random(f"{setup.seed} {part}")
+
+        self._setup = setup
+        self._maker = maker
+        self._kernel = make_kernel(
+            setup.robot, setup.link.baud, rng("kernel"), setup.disturbances, setup.faults
+        )
+        self._kernel.reset(setup.start.x_m, setup.start.y_m, setup.start.theta_rad)
+        self._down = Channel(setup.link, rng("link down"))
+        self._up = Channel(setup.link, rng("link up"))
+        self._arrived: list[bytes] = []
+        self.stream = TwinStream(self, setup.link.baud, self._down, self._arrived)
+        self._drawn = DrawnPoses(load_localiser_error(), setup.camera, rng("localiser"))
+        self._shutter = Shutter(setup.camera, rng("shutter"), HOST_START_S)
+        self._now_s = HOST_START_S
+        self._uplink: deque[tuple[float, bytes]] = deque()
+        self._exposed: deque[Exposure] = deque()
+        self._set_spans(math.inf)
+        self._next_frame = self._shutter.next(self._stalls)
+
+    def now_s(self) -> float:
+        """Return the virtual host clock."""
+        return self._now_s
+
+    def begin(self, t_start_s: float) -> None:
+        """Let timed disturbances and faults count from `t_start_s`."""
+        self._kernel.begin(_kernel_us(t_start_s))
+        self._set_spans(t_start_s)
+
+    def wait(self, until_s: float) -> None:
+        """Move to `until_s`, or to the next arrival of bytes or of a frame before it."""
+        arrived = False
+        while not arrived:
+            frame_s = self._next_frame.arrival_s if self._next_frame else math.inf
+            bytes_s = self._uplink[0][0] if self._uplink else math.inf
+            target_s = min(until_s, frame_s, bytes_s)
+            if not self._advance(target_s):
+                continue
+            self._now_s = max(self._now_s, target_s)
+            arrived = self._take_arrivals() or target_s >= until_s
+
+    def poll_frame(self) -> Frame | None:
+        """Return the oldest frame not yet taken; it is drawn only now."""
+        if not self._exposed:
+            return None
+        exposure = self._exposed.popleft()
+        middle_s = 0.5 * (exposure.start_s + exposure.end_s)
+        hidden = any(start_s <= middle_s < end_s for start_s, end_s in self._occlusions)
+        if self._maker is None:
+            seen = None if hidden else self._pose_at(middle_s)
+            return Frame(exposure.index, exposure.t_cam_s, None, self._drawn.measure(seen))
+        poses = () if hidden else self._poses_over(exposure)
+        return Frame(exposure.index, exposure.t_cam_s, self._maker.make(exposure.index, poses))
+
+    def truth(self) -> Truth:
+        """Return the true state now."""
+        state = self._kernel.state()
+        pose = Pose(*self._pose_at(self._now_s))
+        d0_m = self._setup.robot.d0_m
+        z1_m = (
+            pose.x_m + d0_m * math.cos(pose.theta_rad),
+            pose.y_m + d0_m * math.sin(pose.theta_rad),
+        )
+        return Truth(pose, state[3], state[5], z1_m)
+
+    def close(self) -> None:
+        """Nothing is held that needs releasing."""
+
+    def deliver_to_board(self, t_s: float, data: bytes) -> None:
+        """Let bytes reach the board's UART at `t_s`; in time order."""
+        self._kernel.receive(_kernel_us(t_s), data)
+
+    def _set_spans(self, t_begin_s: float) -> None:
+        def spans(kind: str) -> list[Span]:
+            return [_span(fault, t_begin_s) for fault in self._setup.faults if fault.kind == kind]
+
+        self._stalls = spans("camera_stall")
+        self._occlusions = spans("camera_occluded")
+        self._down.cuts = self._up.cuts = spans("link_cut")
+
+    def _advance(self, target_s: float) -> bool:
+        """Run towards `target_s`; False when the board has sent bytes on the way."""
+        target_us = _kernel_us(target_s)
+        try:
+            reached_us = self._kernel.advance(target_us)
+        except RuntimeError as error:
+            raise RigFault(f"twin: {error}; check the robot's parameters") from None
+        for t_us, data in self._kernel.take_sent():
+            carried = self._up.carry(HOST_START_S + 1e-6 * t_us, data)
+            if carried is not None:
+                self._uplink.append(carried)
+        return reached_us >= target_us
+
+    def _take_arrivals(self) -> bool:
+        """Move what has arrived by now to where the host reads; True when there was any."""
+        arrived = False
+        while self._uplink and self._uplink[0][0] <= self._now_s:
+            self._arrived.append(self._uplink.popleft()[1])
+            arrived = True
+        while self._next_frame and self._next_frame.arrival_s <= self._now_s:
+            self._exposed.append(self._next_frame)
+            self._next_frame = self._shutter.next(self._stalls)
+            arrived = True
+        return arrived
+
+    def _pose_at(self, t_s: float) -> PoseTuple:
+        t_us = 1e6 * (t_s - HOST_START_S)
+        return self._kernel.pose_at(min(max(t_us, 0.0), self._kernel.time_us))
+
+    def _poses_over(self, exposure: Exposure) -> tuple[PoseTuple, ...]:
+        step_s = (exposure.end_s - exposure.start_s) / (POSES_PER_EXPOSURE - 1)
+        return tuple(
+            self._pose_at(exposure.start_s + i * step_s) for i in range(POSES_PER_EXPOSURE)
+        )
+
+
+def _kernel_us(t_s: float) -> int:
+    """Return the first whole microsecond of the kernel's clock not before host time `t_s`."""
+    return math.ceil(1e6 * (t_s - HOST_START_S) - 1e-3)
+
+
+def _span(fault: Fault, t_begin_s: float) -> Span:
+    """Return the host times between which a fault is there (see `hil.config.events.Fault`)."""
+    start_s = t_begin_s + fault.start_s if fault.start_s > 0.0 else -math.inf
+    return start_s, math.inf if fault.end_s is None else t_begin_s + fault.end_s
