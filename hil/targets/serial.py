@@ -9,7 +9,7 @@ import time
 import serial
 
 from hil.errors import BadInput, RigFault
-from hil.targets.base import Frame, Truth
+from hil.targets.base import ByteStream, Frame, Truth
 from hil.targets.frames import FrameSource
 
 DEFAULT_BAUD = 57_600
@@ -79,7 +79,8 @@ class SerialRig:
     """A robot on a serial port and its camera, in real time; nobody knows its true pose."""
 
     def __init__(self, device: str, baud: int, camera: FrameSource | None) -> None:
-        self.stream = SerialStream(device, baud)
+        self._port = SerialStream(device, baud)
+        self.stream: ByteStream = self._port
         self._camera = camera
 
     def now_s(self) -> float:
@@ -92,12 +93,12 @@ class SerialRig:
         if remaining_s <= 0.0:
             return
         if os.name == "posix":
-            sources = [self.stream.port.fileno()]
+            sources = [self._port.port.fileno()]
             if self._camera is not None:
                 sources.append(self._camera.fileno())
             select.select(sources, [], [], remaining_s)
             return
-        while time.monotonic() < until_s and not self.stream.port.in_waiting:
+        while time.monotonic() < until_s and not self._port.port.in_waiting:
             time.sleep(_POLL_S)
 
     def poll_frame(self) -> Frame | None:
@@ -113,6 +114,6 @@ class SerialRig:
 
     def close(self) -> None:
         """Release port and camera; safe to call twice."""
-        self.stream.close()
+        self._port.close()
         if self._camera is not None:
             self._camera.close()
