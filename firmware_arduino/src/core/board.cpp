@@ -1,0 +1,125 @@
+#include "board.h"
+
+#include "protocol.h"
+#include "report.h"
+
+namespace hil {
+
+namespace {
+
+constexpr uint32_t LATE_US = TICK_US + TICK_US / 2;
+
+int32_t counts_of(const BoardInputs& in, uint8_t side) {
+  return side == LEFT ? in.counts_left : in.counts_right;
+}
+
+// Counts moved since the last tick, bounded to 16 bits.
+int16_t moved(const Board& b, const BoardInputs& in, uint8_t side) {
+  const uint32_t now = static_cast<uint32_t>(counts_of(in, side));
+  const int32_t step = static_cast<int32_t>(now - static_cast<uint32_t>(counts_of(b.inputs, side)));
+  if (step > INT16_MAX) return INT16_MAX;
+  return step < -INT16_MAX ? -INT16_MAX : static_cast<int16_t>(step);
+}
+
+// The first snapshot sets the zero of everything that counts differences.
+void first_tick(Board& b, const BoardInputs& in) {
+  b.ticked = true;
+  b.inputs = in;
+  b.inputs.t_us = in.t_us - TICK_US;
+  safety_init(b.safety, in.encoder_faults);
+  for (uint8_t i = 0; i < SIDES; ++i) wheel_init(b.wheel[i], b.tuning, counts_of(in, i));
+}
+
+SafetyView sense(Board& b, const BoardInputs& in) {
+  if (!b.ticked) first_tick(b, in);
+  if (in.t_us - b.inputs.t_us > LATE_US) ++b.overruns;
+  SafetyView view;
+  for (uint8_t i = 0; i < SIDES; ++i) view.side[i] = {b.wheel[i].pwm, moved(b, in, i), 0.0f};
+  view.illegal_total = in.encoder_faults;
+  view.battery_mv = in.battery_mv;
+  view.setpoint_age_us = in.t_us - b.setpoint.t_us;
+  b.inputs = in;
+  return view;
+}
+
+void estimate(Board& b, SafetyView& view) {
+  for (uint8_t i = 0; i < SIDES; ++i) {
+    wheel_estimate(b.wheel[i], b.tuning, counts_of(b.inputs, i));
+    view.side[i].omega_rad_s = b.wheel[i].omega_rad_s;
+  }
+}
+
+void check(Board& b, const SafetyView& view) {
+  if (safety_apply(b.safety, safety_check(b.safety, b.limits, view))) say_state(b);
+}
+
+bool drives(const Board& b) { return b.safety.state == HIL_STATE_ARMED; }
+
+void control(Board& b) {
+  if (!drives(b)) return;
+  for (uint8_t i = 0; i < SIDES; ++i) {
+    wheel_control(b.wheel[i], b.tuning, b.setpoint.omega_rad_s[i]);
+  }
+}
+
+void limit(Board& b) {
+  if (!drives(b)) return;
+  for (uint8_t i = 0; i < SIDES; ++i) wheel_limit(b.wheel[i], b.tuning);
+}
+
+// The gate: whatever the loops say, a board that is not armed has its bridges off.
+void actuate(Board& b, BoardOutputs& out) {
+  if (!drives(b)) {
+    wheel_off(b.wheel[LEFT]);
+    wheel_off(b.wheel[RIGHT]);
+  }
+  out = {b.wheel[LEFT].pwm, b.wheel[RIGHT].pwm};
+}
+
+}  // namespace
+
+void board_init(Board& b) {
+  b = Board{};
+  link_init(b.link);
+  params_defaults(b.params);
+  b.parameter_hash = params_hash(b.params);
+  b.dialect_hash = dialect_hash();
+  b.params_next = PARAM_COUNT;
+  protocol_retune(b);
+  safety_init(b.safety, 0);
+}
+
+void board_receive(Board& b, const uint8_t* bytes, uint16_t n, uint32_t t_us) {
+  for (uint16_t i = 0; i < n; ++i) {
+    if (link_take(b.link, bytes[i])) protocol_handle(b, t_us);
+  }
+}
+
+void board_tick(Board& b, const BoardInputs& in, BoardOutputs& out) {
+  SafetyView view = sense(b, in);
+  estimate(b, view);
+  check(b, view);
+  control(b);
+  limit(b);
+  actuate(b, out);
+  report_tick(b);
+}
+
+uint16_t board_transmit(Board& b, uint8_t* out, uint16_t max) { return ring_take(b.link.tx, out, max); }
+
+ImageResult board_load(Board& b, const uint8_t* image, uint16_t n) {
+  const ImageResult result = params_decode(b.params, image, n);
+  b.parameter_hash = params_hash(b.params);
+  protocol_retune(b);
+  if (result == ImageResult::DAMAGED) say(b, Text::STORAGE_DAMAGED);
+  return result;
+}
+
+bool board_store(Board& b, uint8_t (&image)[IMAGE_SIZE]) {
+  if (!b.store_wanted) return false;
+  b.store_wanted = false;
+  params_encode(b.params, image);
+  return true;
+}
+
+}  // namespace hil

@@ -1,0 +1,74 @@
+// The whole board below the pins: bytes and encoder counts in, PWM and bytes out. Time is an argument.
+#ifndef HIL_CORE_BOARD_H
+#define HIL_CORE_BOARD_H
+
+#include <stdint.h>
+
+#include "constants.h"
+#include "link.h"
+#include "params.h"
+#include "safety.h"
+#include "wheel_loop.h"
+
+namespace hil {
+
+// One snapshot, taken at t_us with interrupts off.
+struct BoardInputs {
+  uint32_t t_us;            // board clock, wraps
+  int32_t counts_left;      // rise when the wheel drives forward
+  int32_t counts_right;
+  uint16_t encoder_faults;  // illegal transitions of both encoders since start, wraps
+  uint16_t battery_mv;
+};
+
+struct BoardOutputs {
+  int16_t pwm_left;  // -PWM_TOP to PWM_TOP, positive drives forward, 0 is bridge off
+  int16_t pwm_right;
+};
+
+struct Setpoint {
+  float omega_rad_s[SIDES];
+  uint16_t seq;
+  uint32_t t_us;  // when it arrived
+  bool any;       // one has come since arming
+};
+
+struct Board {
+  Params params;
+  uint32_t parameter_hash;
+  uint32_t dialect_hash;
+  WheelTuning tuning;
+  SafetyLimits limits;
+  Safety safety;
+  Wheel wheel[SIDES];
+  Setpoint setpoint;
+  Link link;
+  BoardInputs inputs;      // of the last tick
+  bool ticked;             // a tick has been, so `inputs` and the encoder zero are real
+  uint8_t slot;            // place in the one-second schedule of reports, in ticks
+  uint8_t params_next;     // next parameter of a running list; PARAM_COUNT: none
+  uint32_t texts_waiting;  // a bit per text of texts.def
+  uint32_t texts_sent;     // in this second
+  bool store_wanted;
+  uint16_t overruns;       // ticks that came more than half a period late
+  uint16_t refused;        // set-points
+  uint16_t load_permille;  // longest tick of the last second; set by the layer that can measure it
+};
+
+// Defaults in force, disarmed, nothing queued.
+void board_init(Board& b);
+// Takes n bytes that had arrived by t_us.
+void board_receive(Board& b, const uint8_t* bytes, uint16_t n, uint32_t t_us);
+// One control period; call every TICK_US.
+void board_tick(Board& b, const BoardInputs& in, BoardOutputs& out);
+// Hands out up to `max` bytes for the serial port; returns how many.
+uint16_t board_transmit(Board& b, uint8_t* out, uint16_t max);
+
+// Parameters from storage: call after board_init. Anything unsound leaves the defaults and says so.
+ImageResult board_load(Board& b, const uint8_t* image, uint16_t n);
+// True once after the host asked for the parameters to be stored; `image` is then ready to be written.
+bool board_store(Board& b, uint8_t (&image)[IMAGE_SIZE]);
+
+}  // namespace hil
+
+#endif

@@ -1,0 +1,35 @@
+// Frames in and out: cutting, checking, counting, queueing. What they mean is protocol.cpp's business.
+#ifndef HIL_CORE_LINK_H
+#define HIL_CORE_LINK_H
+
+#include <stdint.h>
+
+#include "ring.h"
+#include "wire.h"
+
+namespace hil {
+
+// Room that everything but wheel state leaves free in the ring, so that a wheel state always fits.
+constexpr uint8_t WHEEL_STATE_ROOM = MAVLINK_MSG_ID_WHEEL_STATE_LEN + MAVLINK_NUM_NON_PAYLOAD_BYTES;
+
+struct Link {
+  mavlink_message_t rx;
+  mavlink_status_t status;  // parser state and the sequence number of frames sent
+  Ring tx;
+  bool heard;               // a frame has come in, so gaps in its sequence mean losses
+  uint8_t next_seq;
+  uint16_t received;        // all counters wrap
+  uint16_t lost;
+  uint16_t bad;
+  uint16_t dropped;
+};
+
+void link_init(Link& link);
+// Takes one byte; true when link.rx holds a good frame.
+bool link_take(Link& link, uint8_t byte);
+// Queues the packed message, whole or not at all, leaving `room` bytes free.
+void link_send(Link& link, const mavlink_message_t& message, uint8_t room);
+
+}  // namespace hil
+
+#endif

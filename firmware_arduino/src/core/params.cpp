@@ -1,0 +1,127 @@
+#include "params.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "crc32.h"
+#include "flash.h"
+
+namespace hil {
+
+namespace {
+
+constexpr ParamSpec SPECS[PARAM_COUNT] HIL_FLASH = {
+#define PARAM(name, field, value, low, high, unit, doc) {name, value, low, high, 0},
+#define LIVE_PARAM(name, field, value, low, high, unit, doc) {name, value, low, high, 1},
+#include "params.def"
+#undef LIVE_PARAM
+#undef PARAM
+};
+
+static_assert(sizeof(Params) == 4u * PARAM_COUNT, "parameters are 32-bit floats without padding");
+
+void put(Params& params, uint8_t index, float value) {
+  memcpy(reinterpret_cast<uint8_t*>(&params) + 4u * index, &value, 4);
+}
+
+bool in_range(const ParamSpec& spec, float value) {
+  return isfinite(value) && value >= spec.low && value <= spec.high;
+}
+
+uint32_t names_hash() {
+  uint32_t crc = 0;
+  for (uint8_t i = 0; i < PARAM_COUNT; ++i) {
+    crc = crc32(crc, param_spec(i).name, PARAM_NAME_LENGTH);
+  }
+  return crc;
+}
+
+void write_header(uint8_t* image) {
+  const uint32_t names = names_hash();
+  image[0] = 'H';
+  image[1] = 'L';
+  image[2] = IMAGE_VERSION;
+  image[3] = PARAM_COUNT;
+  memcpy(image + 4, &names, 4);
+}
+
+bool is_blank(const uint8_t* image, uint16_t n) {
+  for (uint16_t i = 0; i < n; ++i) {
+    if (image[i] != 0xFF) return false;
+  }
+  return true;
+}
+
+bool is_sound(const uint8_t* image, uint16_t n) {
+  if (n != IMAGE_SIZE) return false;
+  uint8_t header[8];
+  write_header(header);
+  uint32_t crc;
+  memcpy(&crc, image + IMAGE_SIZE - 4, 4);
+  return memcmp(header, image, sizeof(header)) == 0 && crc == crc32(0, image, IMAGE_SIZE - 4);
+}
+
+}  // namespace
+
+ParamSpec param_spec(uint8_t index) { return flash_read(SPECS[index]); }
+
+uint8_t param_find(const char* name) {
+  for (uint8_t i = 0; i < PARAM_COUNT; ++i) {
+    if (strncmp(param_spec(i).name, name, PARAM_NAME_LENGTH) == 0) return i;
+  }
+  return PARAM_COUNT;
+}
+
+float param_get(const Params& params, uint8_t index) {
+  float value;
+  memcpy(&value, reinterpret_cast<const uint8_t*>(&params) + 4u * index, 4);
+  return value;
+}
+
+ParamResult param_set(Params& params, uint8_t index, float value, bool armed) {
+  if (index >= PARAM_COUNT) return ParamResult::UNKNOWN;
+  const ParamSpec spec = param_spec(index);
+  if (!isfinite(value)) return ParamResult::NOT_FINITE;
+  if (!in_range(spec, value)) return ParamResult::OUT_OF_RANGE;
+  if (armed && !spec.live) return ParamResult::FIXED_WHILE_ARMED;
+  put(params, index, value + 0.0f);  // no negative zero: it would change the hash and nothing else
+  return ParamResult::SET;
+}
+
+void params_defaults(Params& params) {
+  for (uint8_t i = 0; i < PARAM_COUNT; ++i) put(params, i, param_spec(i).initial);
+}
+
+uint32_t param_hash_term(const Params& params, uint8_t index) {
+  const ParamSpec spec = param_spec(index);
+  const float value = param_get(params, index);
+  return crc32(crc32(0, spec.name, PARAM_NAME_LENGTH), &value, 4);
+}
+
+uint32_t params_hash(const Params& params) {
+  uint32_t sum = 0;
+  for (uint8_t i = 0; i < PARAM_COUNT; ++i) sum += param_hash_term(params, i);
+  return sum;
+}
+
+void params_encode(const Params& params, uint8_t (&image)[IMAGE_SIZE]) {
+  write_header(image);
+  memcpy(image + 8, &params, sizeof(Params));
+  const uint32_t crc = crc32(0, image, IMAGE_SIZE - 4);
+  memcpy(image + IMAGE_SIZE - 4, &crc, 4);
+}
+
+ImageResult params_decode(Params& params, const uint8_t* image, uint16_t n) {
+  params_defaults(params);
+  if (is_blank(image, n)) return ImageResult::BLANK;
+  if (!is_sound(image, n)) return ImageResult::DAMAGED;
+  Params stored;
+  memcpy(&stored, image + 8, sizeof(Params));
+  for (uint8_t i = 0; i < PARAM_COUNT; ++i) {
+    if (!in_range(param_spec(i), param_get(stored, i))) return ImageResult::DAMAGED;
+  }
+  params = stored;
+  return ImageResult::LOADED;
+}
+
+}  // namespace hil

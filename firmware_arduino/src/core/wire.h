@@ -1,0 +1,28 @@
+// The generated dialect with the settings of a small board, and its hash.
+#ifndef HIL_CORE_WIRE_H
+#define HIL_CORE_WIRE_H
+
+// The generated headers are not ours to hold to our warnings.
+#pragma GCC system_header
+
+#include <stdint.h>
+
+#define MAVLINK_COMM_NUM_BUFFERS 1
+#define MAVLINK_MAX_PAYLOAD_LEN 54  // STATUSTEXT; a false start of frame costs 66 bytes at most
+#define MAVLINK_NO_SIGN_PACKET
+#define MAVLINK_NO_SIGNATURE_CHECK
+#define MAVLINK_NO_CONVERSION_HELPERS
+#define MAVLINK_GET_MSG_ENTRY  // one table in flash or RAM for parser and hash: wire.cpp
+#include "../mavlink/mavlink_types.h"
+const mavlink_msg_entry_t* mavlink_get_msg_entry(uint32_t msgid);
+#include "../mavlink/hil/mavlink.h"
+
+namespace hil {
+
+// CRC-32 over (msgid u32, crc_extra u8, max length u8), little-endian, in order of msgid. crc_extra
+// covers message names, field names and types. The host derives the same from its generated module.
+uint32_t dialect_hash();
+
+}  // namespace hil
+
+#endif
