@@ -39,7 +39,7 @@ def unit_of(key: str) -> str:
 
 
 def builtin_names(kind: str) -> list[str]:
-    """Return the names of the built-in files of one kind: "scenarios", "labs" or "robots"."""
+    """Return the names of the built-in files of one kind: "scenarios", "labs", "robots" or "decks"."""
     folder = files("hil") / "data" / kind
     return sorted(item.name[:-5] for item in folder.iterdir() if item.name.endswith(".toml"))
 

@@ -49,7 +49,9 @@ class Truth:
 class Rig(Protocol):
     """A robot with its board and camera, real or simulated; times are host times in s."""
 
-    stream: ByteStream
+    @property
+    def stream(self) -> ByteStream:
+        """The bytes to and from the board."""
 
     def now_s(self) -> float:
         """Return the host clock (monotonic)."""

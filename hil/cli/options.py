@@ -1,0 +1,46 @@
+"""Options and output that several commands share, each declared once."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+LAWS = click.Choice(["pid", "asg-ism"])
+
+target_option = click.option(
+    "--on", "target", default="twin", show_default=True, metavar="TARGET",
+    help="twin, pil, or serial:DEV[@BAUD].",
+)  # fmt: skip
+camera_option = click.option(
+    "--camera", default="rendered", show_default=True, metavar="SOURCE",
+    help="rendered, pose (no pictures, drawn measurement errors), a camera INDEX or a video FILE.",
+)  # fmt: skip
+outer_option = click.option("--outer", type=LAWS, default="asg-ism", show_default=True,
+                            help="Outer law, on the host.")  # fmt: skip
+inner_option = click.option("--inner", type=LAWS, default="asg-ism", show_default=True,
+                            help="Wheel law, on the board.")  # fmt: skip
+seed_option = click.option(
+    "--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True,
+    help="Draws noise, jitter, losses and random disturbances of simulated targets.",
+)  # fmt: skip
+set_option = click.option(
+    "--set", "overrides", multiple=True, metavar="KEY=VALUE",
+    help="Change any scenario or robot value by dotted name, for example robot.mass_kg=3.1.",
+)  # fmt: skip
+out_option = click.option(
+    "--out", type=click.Path(path_type=Path), metavar="DIR",
+    help="Folder for the record(s); must not exist or be empty. [default: a new one in runs/]",
+)  # fmt: skip
+json_option = click.option("--json", "as_json", is_flag=True,
+                           help="One JSON document on stdout, nothing else.")  # fmt: skip
+
+
+def print_json(document: dict[str, Any]) -> None:
+    """Write one JSON document to stdout."""
+    click.echo(json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False))

@@ -1,0 +1,26 @@
+"""Progress bars on stderr, shared by the commands that take long."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+
+Update = Callable[[str, float], None]
+
+
+@contextmanager
+def run_progress(durations_s: Mapping[str, float]) -> Iterator[Update]:
+    """Show one bar per run; `update(name, t_s)` moves it. Nothing is shown off a terminal."""
+    from rich.console import Console  # noqa: PLC0415 - keep `hil --help` fast
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415
+
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:5.1f}/{task.total:.0f} s simulated"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bars:
+        tasks = {name: bars.add_task(name, total=total) for name, total in durations_s.items()}
+        yield lambda name, t_s: bars.update(tasks[name], completed=t_s)

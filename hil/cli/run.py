@@ -1,0 +1,123 @@
+"""`hil run`: one scenario, one target, one record."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hil.cli.options import (
+    camera_option,
+    inner_option,
+    json_option,
+    out_option,
+    outer_option,
+    print_json,
+    seed_option,
+    set_option,
+    target_option,
+)
+from hil.cli.progress import run_progress
+
+if TYPE_CHECKING:
+    from hil.record.reader import RunRecord
+
+
+@click.command("run")
+@click.argument("scenario")
+@target_option
+@outer_option
+@inner_option
+@camera_option
+@seed_option
+@set_option
+@out_option
+@click.option("--record-camera", is_flag=True, help="Keep every frame in camera.mkv.")
+@click.option("--view", is_flag=True, help="Open the record in the viewer afterwards.")
+@json_option
+def command(
+    scenario: str,
+    target: str,
+    outer: str,
+    inner: str,
+    camera: str,
+    seed: int,
+    overrides: tuple[str, ...],
+    out: Path | None,
+    record_camera: bool,
+    view: bool,
+    as_json: bool,
+) -> int:
+    """Run SCENARIO (a built-in name or a TOML file) and record it.
+
+    Built in: scenario-1, scenario-2, scenario-3 (the three experiments) and circle (section 8.9).
+    """
+    from hil.config.load import load_scenario  # noqa: PLC0415 - keep `hil --help` fast
+    from hil.record.manifest import command_line  # noqa: PLC0415
+    from hil.run import RunSpec, execute, exit_status, new_folder  # noqa: PLC0415
+
+    resolved = load_scenario(scenario, overrides)
+    spec = RunSpec(
+        scenario=resolved,
+        target=target,
+        camera=camera,
+        outer=outer,
+        inner=inner,
+        seed=seed,
+        out=out or new_folder(f"{resolved.name}-{outer}"),
+        record_camera=record_camera,
+        command=command_line(),
+    )
+    with run_progress({resolved.name: resolved.duration_s}) as update:
+        record = execute(spec, lambda t_s: update(resolved.name, t_s))
+    if as_json:
+        print_json(summary(record))
+    else:
+        print_summary(record)
+    if view:
+        from hil.cli.view import open_viewer  # noqa: PLC0415
+
+        open_viewer([record.path])
+    return exit_status(record)
+
+
+def summary(record: RunRecord) -> dict[str, Any]:
+    """Return what `--json` says of one run."""
+    manifest = record.manifest
+    return {
+        "record": str(record.path),
+        "scenario": manifest.scenario_name,
+        "target": manifest.target,
+        "outer": manifest.outer,
+        "inner": manifest.inner,
+        "seed": manifest.seed,
+        "outcome": manifest.outcome,
+        "detail": manifest.outcome_detail,
+        "requirements": [
+            {"text": item.text(), "value": _finite(item.value), "holds": item.holds}
+            for item in record.verdicts()
+        ],
+        **record.figures().to_json(),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if value == value else None
+
+
+def print_summary(record: RunRecord) -> None:
+    """Write outcome, requirements and the place of the record to stdout."""
+    from rich.console import Console  # noqa: PLC0415
+
+    console = Console(highlight=False, soft_wrap=True)
+    manifest = record.manifest
+    console.print(
+        f"{manifest.scenario_name} on {manifest.target}, outer {manifest.outer}, "
+        f"inner {manifest.inner}, seed {manifest.seed}: {manifest.outcome}"
+        + (f" - {manifest.outcome_detail}" if manifest.outcome_detail else "")
+    )
+    for item in record.verdicts():
+        mark = "[green]holds[/green]" if item.holds else "[red]FAILS[/red]"
+        console.print(f"  {mark}  {item.text()}   (is {item.value:.4g})")
+    console.print(f"record: {record.path}")

@@ -1,0 +1,64 @@
+"""The time base of a record: host time in, seconds since the first tick of control out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Literal
+
+from hil.rows import frame_row
+
+if TYPE_CHECKING:
+    from hil.record.recorder import Recorder
+    from hil.targets.base import Frame
+    from hil.types import PoseMeasurement
+
+
+class Timeline:
+    """Writes frames, events and link traffic to a recorder with t = 0 at the start of control.
+
+    What happens before that instant is known is held back (a few seconds of connecting) and then
+    written with its negative times.
+    """
+
+    def __init__(self, recorder: Recorder) -> None:
+        self._recorder = recorder
+        self._origin_s: float | None = None
+        self._held: list[tuple[float, Callable[[float], None]]] = []
+
+    def start(self, t_host_s: float) -> None:
+        """Make `t_host_s` the record's zero; a second call changes nothing."""
+        if self._origin_s is not None:
+            return
+        self._origin_s = t_host_s
+        for t_s, write in self._held:
+            write(t_s - t_host_s)
+        self._held.clear()
+
+    def _at(self, t_host_s: float, write: Callable[[float], None]) -> None:
+        if self._origin_s is None:
+            self._held.append((t_host_s, write))
+        else:
+            write(t_host_s - self._origin_s)
+
+    def link_frame(self, way: Literal["rx", "tx"], t_host_s: float, data: bytes) -> None:
+        """Record one MAVLink frame."""
+        if self._origin_s is not None:  # the short way: this runs for every frame
+            self._recorder.link_frame(t_host_s - self._origin_s, data)
+        else:
+            self._held.append((t_host_s, lambda t_s: self._recorder.link_frame(t_s, data)))
+
+    def camera_frame(
+        self, frame: Frame, t_host_s: float, t_exposure_s: float, measurement: PoseMeasurement
+    ) -> None:
+        """Record one camera frame, what was seen in it, and its image if it has one."""
+        latency_s = t_host_s - t_exposure_s
+        self._at(
+            t_host_s,
+            lambda t_s: self._recorder.frame(
+                frame_row(frame, t_s, t_s - latency_s, measurement), frame.image
+            ),
+        )
+
+    def event(self, t_host_s: float, kind: str, text: str) -> None:
+        """Record what happened."""
+        self._at(t_host_s, lambda t_s: self._recorder.event(t_s, kind, text))

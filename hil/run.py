@@ -1,0 +1,163 @@
+"""From a scenario to a finished run record: builds the parts, runs the session, closes the record."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hil import _firmware
+from hil.clocks import CameraClock
+from hil.errors import BadInput
+from hil.estimator import BelievedGeometry, make_estimator
+from hil.laws import make_outer_law
+from hil.metrics import LinkStats
+from hil.record.manifest import Manifest, collect_versions, git_revision
+from hil.record.recorder import Recorder
+from hil.record.timeline import Timeline
+from hil.references import make_reference
+from hil.session import Parts, Progress, Session
+from hil.targets import open_rig
+from hil.wire.identity import board_hashes
+from hil.wire.link import BoardLink
+from vision.marks import MarkLocaliser
+
+if TYPE_CHECKING:
+    from hil.config.scenario import Scenario
+    from hil.record.reader import RunRecord
+    from hil.targets.base import Rig
+
+# Value of the board's parameter LAW for each wheel law.
+INNER_LAWS = {"asg-ism": 0.0, "pid": 1.0}
+
+
+@dataclass(frozen=True, slots=True)
+class RunSpec:
+    """Everything that decides a run; two runs of equal specs on a simulated target are equal."""
+
+    scenario: Scenario
+    target: str
+    camera: str
+    outer: str
+    inner: str
+    seed: int
+    out: Path
+    record_camera: bool = False
+    rerun: bool = True
+    command: str = ""
+
+
+def exit_status(record: RunRecord) -> int:
+    """Return the exit status of a run: 0 held, 1 a requirement failed, 3 rig fault, 130 Ctrl-C."""
+    outcome = record.manifest.outcome
+    if outcome != "complete":
+        return 130 if outcome == "interrupted" else 3
+    return 0 if all(verdict.holds for verdict in record.verdicts()) else 1
+
+
+def new_folder(stem: str) -> Path:
+    """Return a folder in runs/ that does not exist yet, named after `stem` and the time."""
+    stamp = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
+    folder = Path("runs") / f"{stem}-{stamp}"
+    number = 2
+    while folder.exists():
+        folder = folder.with_name(f"{stem}-{stamp}-{number}")
+        number += 1
+    return folder
+
+
+def execute(spec: RunSpec, progress: Progress | None = None) -> RunRecord:
+    """Run the spec and return its closed record; raises BadInput before anything is written."""
+    parameters = board_parameters(spec.scenario, spec.inner)
+    rig = open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
+    try:
+        recorder = Recorder(
+            spec.out,
+            make_manifest(spec),
+            record_camera=spec.record_camera,
+            frame_rate_hz=spec.scenario.camera.rate_hz,
+            rerun=spec.rerun,
+        )
+        parts = make_parts(spec, rig, recorder)
+        session = Session(spec.scenario, parts, parameters, board_hashes, progress)
+        ending = session.run()
+        return recorder.close(ending.outcome, ending.detail, link_stats(parts.link))
+    finally:
+        rig.close()
+
+
+def board_parameters(scenario: Scenario, inner: str) -> dict[str, float]:
+    """Return every board parameter: its default, or the scenario's value within its bounds."""
+    table = {entry.name: entry for entry in _firmware.parameter_table()}
+    values = {name: entry.default for name, entry in table.items()}
+    for name, value in scenario.board.items():
+        if name not in table:
+            raise BadInput(f"board.{name}: no such parameter; known: {', '.join(table)}")
+        entry = table[name]
+        if not entry.minimum <= value <= entry.maximum:
+            raise BadInput(
+                f"board.{name} = {value:g} {entry.unit}: allowed {entry.minimum:g} to "
+                f"{entry.maximum:g} {entry.unit}"
+            )
+        values[name] = value
+    values["ENC_COUNTS"] = float(scenario.robot.encoder_counts_per_turn)
+    values["LAW"] = INNER_LAWS[inner]
+    return values
+
+
+def make_parts(spec: RunSpec, rig: Rig, recorder: Recorder) -> Parts:
+    """Return the parts of a session over `rig`."""
+    scenario, control = spec.scenario, spec.scenario.control
+    robot = scenario.robot
+    geometry = BelievedGeometry(
+        robot.wheel_radius_m, robot.track_m, robot.d0_m, robot.encoder_counts_per_turn
+    )
+    timeline = Timeline(recorder)
+    return Parts(
+        rig=rig,
+        link=BoardLink(rig.stream, timeline.link_frame),
+        camera_clock=CameraClock(scenario.camera.latency_s),
+        localiser=MarkLocaliser(scenario.camera.model(), scenario.camera.marks),
+        estimator=make_estimator(control.estimator, control.fusion, geometry),
+        law=make_outer_law(spec.outer, control.active_gains, control.limits, robot.d0_m),
+        reference=make_reference(scenario.reference),
+        geometry=geometry,
+        recorder=recorder,
+        timeline=timeline,
+    )
+
+
+def make_manifest(spec: RunSpec) -> Manifest:
+    """Return the manifest a record opens with."""
+    gains = spec.scenario.control.active_gains.model_dump(mode="json")
+    now_us = time.time_ns() // 1000
+    return Manifest(
+        command=spec.command,
+        scenario=spec.scenario.model_dump(mode="json"),
+        seed=spec.seed,
+        target=spec.target,
+        camera=spec.camera,
+        outer=spec.outer,
+        inner=spec.inner,
+        gains={
+            "outer": gains[spec.outer.replace("-", "_")],
+            "set": spec.scenario.control.gain_set,
+            "board": board_parameters(spec.scenario, spec.inner),
+        },
+        versions=collect_versions(),
+        git_revision=git_revision(),
+        start_time_utc=datetime.fromtimestamp(now_us * 1e-6, UTC).isoformat(timespec="seconds"),
+        start_unix_us=now_us,
+    )
+
+
+def link_stats(link: BoardLink) -> LinkStats:
+    """Return the counters of the host's end of the link."""
+    counters = link.counters
+    return LinkStats(
+        frames_received=counters.frames,
+        frames_lost=counters.lost,
+        bytes_rejected=counters.skipped_bytes,
+    )
