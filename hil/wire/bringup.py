@@ -20,6 +20,10 @@ from hil.wire.link import BoardLink, Procedure
 _FIRST_HEARTBEAT_S = 6.0
 _REPLY_S = 0.5
 _TRIES = 6
+# A PARAM_VALUE takes 6.4 ms at 57,600 baud, and half of the line belongs to the wheel states.
+_PARAMETER_PACE_S = 0.02
+# The board says at most five texts a second.
+_TEXT_S = 0.5
 _FLOAT = struct.Struct("<f")
 
 
@@ -35,7 +39,8 @@ def finish(link: BoardLink, rig: Rig, procedure: Procedure) -> None:
 def connect(link: BoardLink, parameters: Mapping[str, float]) -> Procedure:
     """Wait for the board, learn who it is, and make its parameters the ones given.
 
-    Afterwards `link.info` and `link.parameters` are the board's own account of itself.
+    Afterwards `link.info` and `link.parameters` are the board's own account of itself. A board
+    whose parameter hash is that of `parameters` has them all, and they are not fetched.
     """
     if not (yield from _wait(link, lambda: link.heartbeats > 0, _FIRST_HEARTBEAT_S)):
         raise RigFault(
@@ -45,11 +50,13 @@ def connect(link: BoardLink, parameters: Mapping[str, float]) -> Procedure:
         )
     yield from read_info(link)
     _check_dialect(link)
+    if link.info.parameter_hash == identity.parameter_hash(parameters):
+        link.parameters = {name: _float32(value) for name, value in parameters.items()}
+        return
     yield from download_parameters(link)
     for name, value in parameters.items():
         yield from set_parameter(link, name, value)
-    if parameters:
-        yield from read_info(link)  # with the parameter hash as it now is
+    yield from read_info(link)  # with the parameter hash as it now is
 
 
 def _check_dialect(link: BoardLink) -> None:
@@ -74,35 +81,27 @@ def read_info(link: BoardLink) -> Procedure:
 
 
 def download_parameters(link: BoardLink) -> Procedure:
-    """Fetch all parameters; those lost on the way are asked for again by index."""
+    """Fetch all parameters by index, paced; those lost on the way are asked for again."""
     link.parameters.clear()
     link.parameter_names.clear()
-    yield from _ask(
-        link,
-        lambda _: link.send(
-            dialect.MAVLink_param_request_list_message(BOARD_SYSTEM, BOARD_COMPONENT)
-        ),
-        lambda: bool(link.parameter_names),
-        "the request for its parameters",
-    )
-    more = True
-    while more and len(link.parameter_names) < link.parameter_count:
-        more = yield from _wait_for_more(link)
-    for index in range(link.parameter_count):
+    yield from _ask_parameter(link, 0)
+    for index in range(1, link.parameter_count):
+        _request_parameter(link, index)
+        yield from _wait(link, lambda: False, _PARAMETER_PACE_S)
+    yield from _wait(link, lambda: len(link.parameter_names) == link.parameter_count, _REPLY_S)
+    for index in range(1, link.parameter_count):
         if index not in link.parameter_names:
-            yield from _request_parameter(link, index)
+            yield from _ask_parameter(link, index)
 
 
-def _wait_for_more(link: BoardLink) -> Generator[None, None, bool]:
-    seen = len(link.parameter_names)
-    return (yield from _wait(link, lambda: len(link.parameter_names) > seen, _REPLY_S))
+def _request_parameter(link: BoardLink, index: int) -> None:
+    link.send(dialect.MAVLink_param_request_read_message(BOARD_SYSTEM, BOARD_COMPONENT, b"", index))
 
 
-def _request_parameter(link: BoardLink, index: int) -> Procedure:
-    message = dialect.MAVLink_param_request_read_message(BOARD_SYSTEM, BOARD_COMPONENT, b"", index)
+def _ask_parameter(link: BoardLink, index: int) -> Procedure:
     yield from _ask(
         link,
-        lambda _: link.send(message),
+        lambda _: _request_parameter(link, index),
         lambda: index in link.parameter_names,
         f"the request for parameter {index}",
     )
@@ -115,6 +114,7 @@ def set_parameter(link: BoardLink, name: str, value: float) -> Procedure:
         raise RigFault(f"board: has no parameter {name!r}; is its firmware another version?")
     if link.parameters[name] == wanted:
         return
+    start_s = link.t_s
     link.parameters[name] = math.nan
     message = dialect.MAVLink_param_set_message(
         BOARD_SYSTEM, BOARD_COMPONENT, name.encode(), value, dialect.MAV_PARAM_TYPE_REAL32
@@ -126,9 +126,9 @@ def set_parameter(link: BoardLink, name: str, value: float) -> Procedure:
         f"setting parameter {name}",
     )
     if link.parameters[name] != wanted:
+        why = yield from _explanation(link, start_s)
         raise RigFault(
-            f"board: parameter {name} stays at {link.parameters[name]:g} instead of {value:g}"
-            f"{_last_word(link)}"
+            f"board: parameter {name} stays at {link.parameters[name]:g} instead of {value:g}{why}"
         )
 
 
@@ -180,6 +180,7 @@ def _ask(
 
 
 def _command(link: BoardLink, what: str, command: int, *params: float) -> Procedure:
+    start_s = link.t_s
     link.acks.pop(command, None)
     yield from _ask(
         link,
@@ -189,12 +190,14 @@ def _command(link: BoardLink, what: str, command: int, *params: float) -> Proced
     )
     result = link.acks[command]
     if result != dialect.MAV_RESULT_ACCEPTED:
-        yield from _wait(link, lambda: False, 0.1)  # for the text that says why
+        why = yield from _explanation(link, start_s)
         name = dialect.enums["MAV_RESULT"][result].name.removeprefix("MAV_RESULT_")
-        raise RigFault(f"board: refuses to {what} ({name}){_last_word(link)}")
+        raise RigFault(f"board: refuses to {what} ({name}){why}")
 
 
-def _last_word(link: BoardLink) -> str:
+def _explanation(link: BoardLink, start_s: float) -> Generator[None, None, str]:
+    """Wait for what the board says about a refusal after `start_s`; return it, or nothing."""
+    yield from _wait(link, lambda: bool(link.texts) and link.texts[-1].t_host_s > start_s, _TEXT_S)
     return f": {link.texts[-1].text}" if link.texts else ""
 
 
