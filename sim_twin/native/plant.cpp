@@ -12,11 +12,28 @@ inline double soft_sign(double v, double v_s) { return v / std::sqrt(v * v + v_s
 
 }  // namespace
 
-Plant::Plant(const PlantParams& params) : p_(params) {
-  const double n = p_.motor_per_side;
-  const double rotor = p_.motor_gear_ratio * p_.motor_gear_ratio * p_.motor_rotor_inertia_kg_m2;
-  wheel_side_inertia_ = n * rotor + 2.0 * p_.wheel_inertia_kg_m2;  // two wheels a side
-  reset(0.0, 0.0, 0.0);
+Plant::Plant(const PlantParams& params) : p_(params), d_(derive(params)) { reset(0.0, 0.0, 0.0); }
+
+Plant::Derived Plant::derive(const PlantParams& p) {
+  const double rotor = p.motor_gear_ratio * p.motor_gear_ratio * p.motor_rotor_inertia_kg_m2;
+  const double wheelbase_m = p.front_axle_m + p.rear_axle_m;
+  Derived d{};
+  d.per_radius = 1.0 / p.wheel_radius_m;
+  d.per_inductance = 1.0 / p.motor_inductance_h;
+  d.per_stribeck = 1.0 / p.motor_stribeck_rad_s;
+  d.per_charge = 1.0 / (3600.0 * p.battery_capacity_a_h);
+  d.side_inertia = p.motor_per_side * rotor + 2.0 * p.wheel_inertia_kg_m2;  // two wheels a side
+  d.emf_v_s = p.motor_emf_constant_v_s_rad * p.motor_gear_ratio;
+  d.gear_n_m_a = p.motor_torque_constant_n_m_a * p.motor_gear_ratio;
+  d.weight_n = p.mass_kg * kGravity;
+  d.roll_n = 0.5 * p.floor_rolling_ratio * d.weight_n;
+  d.slide_front_n = p.floor_friction_ratio * d.weight_n * p.rear_axle_m / wheelbase_m;
+  d.slide_rear_n = p.floor_friction_ratio * d.weight_n * p.front_axle_m / wheelbase_m;
+  const double rim_kg = 2.0 * d.side_inertia * d.per_radius * d.per_radius;
+  d.per_mass_rim = 1.0 / (p.mass_kg + rim_kg);
+  d.per_inertia_rim = 1.0 / (p.inertia_kg_m2 + p.mass_kg * p.d0_m * p.d0_m +
+                             0.25 * p.track_m * p.track_m * rim_kg);
+  return d;
 }
 
 void Plant::reset(double x_m, double y_m, double theta_rad) {
@@ -32,25 +49,25 @@ double Plant::battery_v(const Drive& drive, double sag_v) const {
 }
 
 // The bridge draws duty * current from the battery (power in = power out, drop taken at the motor).
+double Plant::draw_a(const StateVector& x, const Drive& drive) const {
+  return p_.battery_idle_a + p_.motor_per_side * (drive.duty_left * x[kCurrentL] +
+                                                  drive.duty_right * x[kCurrentR]);
+}
+
 double Plant::battery_v(const StateVector& x, const Drive& drive, double sag_v) const {
-  const double open_v =
-      p_.battery_empty_v + (p_.battery_full_v - p_.battery_empty_v) * x[kCharge];
-  const double draw_a = p_.battery_idle_a + p_.motor_per_side * (drive.duty_left * x[kCurrentL] +
-                                                                 drive.duty_right * x[kCurrentR]);
-  return open_v - p_.battery_resistance_ohm * draw_a - sag_v;
+  const double open_v = p_.battery_empty_v + (p_.battery_full_v - p_.battery_empty_v) * x[kCharge];
+  return open_v - p_.battery_resistance_ohm * draw_a(x, drive) - sag_v;
 }
 
 // Motor, bridge and gear of one side (2.11).
 Plant::SideForces Plant::side(double current_a, double omega_rad_s, double duty, double jam,
                               double load_n_m, double battery_v) const {
-  const double n = p_.motor_per_side;
-  const double channel_a = n * current_a;
+  const double channel_a = p_.motor_per_side * current_a;
   const double drop_v = p_.bridge_drop_v * soft_sign(channel_a, p_.bridge_smoothing_a) +
                         p_.bridge_resistance_ohm * channel_a;
-  const double emf_v = p_.motor_emf_constant_v_s_rad * p_.motor_gear_ratio * omega_rad_s;
-  const double gear_n_m = p_.motor_torque_constant_n_m_a * p_.motor_gear_ratio * current_a;
+  const double gear_n_m = d_.gear_n_m_a * current_a;
   const double sign = soft_sign(omega_rad_s * p_.wheel_radius_m, p_.floor_smoothing_m_s);
-  const double ratio = omega_rad_s / p_.motor_stribeck_rad_s;
+  const double ratio = omega_rad_s * d_.per_stribeck;
   // Gear loss is friction in proportion to load: eta_g k_t N i when driving, as printed, and no
   // gain of energy when the wheel drives the motor, where eta_g would have to divide.
   const double coulomb_n_m =
@@ -59,10 +76,9 @@ Plant::SideForces Plant::side(double current_a, double omega_rad_s, double duty,
       (1.0 - p_.motor_gear_efficiency_ratio) * std::fabs(gear_n_m);
   const double friction_n_m = sign * coulomb_n_m + p_.motor_viscous_n_m_s_rad * omega_rad_s;
   SideForces out;
-  out.current_dot =
-      (duty * battery_v - drop_v - p_.motor_resistance_ohm * current_a - emf_v) /
-      p_.motor_inductance_h;
-  out.torque_n_m = n * (gear_n_m - friction_n_m) - jam * omega_rad_s - load_n_m;
+  out.current_dot = d_.per_inductance * (duty * battery_v - drop_v - d_.emf_v_s * omega_rad_s -
+                                         p_.motor_resistance_ohm * current_a);
+  out.torque_n_m = p_.motor_per_side * (gear_n_m - friction_n_m) - jam * omega_rad_s - load_n_m;
   out.rolling_sign = sign;
   return out;
 }
@@ -86,9 +102,7 @@ StateVector Plant::derivative(const StateVector& x, const Drive& drive,
   dx[kCurrentR] = sides[1].current_dot;
   dx[kWheelL] = x[kOmegaL];
   dx[kWheelR] = x[kOmegaR];
-  const double draw_a = p_.battery_idle_a + p_.motor_per_side * (drive.duty_left * x[kCurrentL] +
-                                                                 drive.duty_right * x[kCurrentR]);
-  dx[kCharge] = -draw_a / (3600.0 * p_.battery_capacity_a_h);
+  dx[kCharge] = -d_.per_charge * draw_a(x, drive);
   if (p_.slip) {
     slipping(x, sides, load, gravity, dx);
   } else {
@@ -101,31 +115,31 @@ StateVector Plant::derivative(const StateVector& x, const Drive& drive,
 // for (eta1, theta_dot), with the inertia of wheels and rotors in both.
 void Plant::constrained(const StateVector& x, const SideForces* sides, const LoadVector& load,
                         const double* gravity, StateVector& dx) const {
-  const double m = p_.mass_kg, r = p_.wheel_radius_m, half = 0.5 * p_.track_m, d0 = p_.d0_m;
-  const double af = p_.front_axle_m, b = p_.rear_axle_m;
+  const double m = p_.mass_kg, half = 0.5 * p_.track_m, d0 = p_.d0_m;
   const double w = x[kThetaDot], eta1 = x[kEta1], eta2 = x[kEta2];
   const double grip = 1.0 + load[kFrictionChange];
-  const double roll_n = grip * p_.floor_rolling_ratio * 0.5 * m * kGravity;
-  const double force_l = sides[0].torque_n_m / r - roll_n * sides[0].rolling_sign;
-  const double force_r = sides[1].torque_n_m / r - roll_n * sides[1].rolling_sign;
+  const double force_l =
+      sides[0].torque_n_m * d_.per_radius - grip * d_.roll_n * sides[0].rolling_sign;
+  const double force_r =
+      sides[1].torque_n_m * d_.per_radius - grip * d_.roll_n * sides[1].rolling_sign;
 
-  const double front = soft_sign(eta2 + af * w, p_.floor_smoothing_m_s);
-  const double rear = soft_sign(eta2 - b * w, p_.floor_smoothing_m_s);
-  const double slide_n = grip * p_.floor_friction_ratio * m * kGravity / (af + b);
-  const double lateral_n = slide_n * (b * front + af * rear);            // F_y
-  const double scrub_n_m = slide_n * af * b * (front - rear);            // M_r, lateral part
+  const double front_n = grip * d_.slide_front_n *
+                         soft_sign(eta2 + p_.front_axle_m * w, p_.floor_smoothing_m_s);
+  const double rear_n = grip * d_.slide_rear_n *
+                        soft_sign(eta2 - p_.rear_axle_m * w, p_.floor_smoothing_m_s);
+  const double lateral_n = front_n + rear_n;                                          // F_y
+  const double scrub_n_m = p_.front_axle_m * front_n - p_.rear_axle_m * rear_n;       // in M_r
 
-  const double rim_kg = wheel_side_inertia_ / (r * r);
   const double push_x = load[kForceForward] + m * gravity[0];
   const double push_y = load[kForceLeft] + m * gravity[1];
-  dx[kEta1] = (force_l + force_r + push_x + m * eta2 * w) / (m + 2.0 * rim_kg) + load[kAccForward];
+  dx[kEta1] =
+      (force_l + force_r + push_x + m * eta2 * w) * d_.per_mass_rim + load[kAccForward];
   const double moment = half * (force_r - force_l) - scrub_n_m + load[kTorqueYaw] +
                         d0 * (lateral_n - push_y + m * eta1 * w);
-  const double inertia = p_.inertia_kg_m2 + m * d0 * d0 + 2.0 * half * half * rim_kg;
-  dx[kThetaDot] = moment / inertia + load[kAccYaw] - load[kAccLateral] / d0;
+  dx[kThetaDot] = moment * d_.per_inertia_rim + load[kAccYaw] - load[kAccLateral] / d0;
   dx[kEta2] = -d0 * dx[kThetaDot];
-  dx[kOmegaL] = (dx[kEta1] - half * dx[kThetaDot]) / r;
-  dx[kOmegaR] = (dx[kEta1] + half * dx[kThetaDot]) / r;
+  dx[kOmegaL] = (dx[kEta1] - half * dx[kThetaDot]) * d_.per_radius;
+  dx[kOmegaR] = (dx[kEta1] + half * dx[kThetaDot]) * d_.per_radius;
 }
 
 // Four Coulomb contacts: each pushes against the slip velocity of its patch, so that sliding
@@ -133,12 +147,11 @@ void Plant::constrained(const StateVector& x, const SideForces* sides, const Loa
 void Plant::slipping(const StateVector& x, const SideForces* sides, const LoadVector& load,
                      const double* gravity, StateVector& dx) const {
   const double m = p_.mass_kg, r = p_.wheel_radius_m, half = 0.5 * p_.track_m;
-  const double af = p_.front_axle_m, b = p_.rear_axle_m;
   const double w = x[kThetaDot];
   const double grip = 1.0 + load[kFrictionChange];
   const double v_s = p_.floor_slip_smoothing_m_s;
-  const double axle_x[2] = {af, -b};
-  const double weight_n[2] = {0.5 * m * kGravity * b / (af + b), 0.5 * m * kGravity * af / (af + b)};
+  const double axle_x[2] = {p_.front_axle_m, -p_.rear_axle_m};
+  const double wheel_n[2] = {0.5 * grip * d_.slide_front_n, 0.5 * grip * d_.slide_rear_n};
   double fx = 0.0, fy = 0.0, moment = 0.0;
   for (int side = 0; side < 2; ++side) {
     const double y = side == 0 ? half : -half;
@@ -146,17 +159,16 @@ void Plant::slipping(const StateVector& x, const SideForces* sides, const LoadVe
     double drive_n = 0.0;
     for (int axle = 0; axle < 2; ++axle) {
       const double slip_y = x[kEta2] + axle_x[axle] * w;
-      const double share = grip * p_.floor_friction_ratio * weight_n[axle] /
-                           std::sqrt(slip_x * slip_x + slip_y * slip_y + v_s * v_s);
+      const double share =
+          wheel_n[axle] / std::sqrt(slip_x * slip_x + slip_y * slip_y + v_s * v_s);
       drive_n -= share * slip_x;
       fy -= share * slip_y;
       moment -= axle_x[axle] * share * slip_y;
     }
     fx += drive_n;
     moment -= y * drive_n;
-    const double roll_n = grip * p_.floor_rolling_ratio * 0.5 * m * kGravity;
-    dx[kOmegaL + side] = (sides[side].torque_n_m - r * roll_n * sides[side].rolling_sign -
-                          r * drive_n) / wheel_side_inertia_;
+    const double rim_n = grip * d_.roll_n * sides[side].rolling_sign + drive_n;
+    dx[kOmegaL + side] = (sides[side].torque_n_m - r * rim_n) / d_.side_inertia;
   }
   dx[kEta1] = (fx + load[kForceForward]) / m + gravity[0] + x[kEta2] * w + load[kAccForward];
   dx[kEta2] = (fy + load[kForceLeft]) / m + gravity[1] - x[kEta1] * w + load[kAccLateral];
@@ -166,8 +178,8 @@ void Plant::slipping(const StateVector& x, const SideForces* sides, const LoadVe
 void Plant::apply_constraint(StateVector& x) const {
   const double half = 0.5 * p_.track_m;
   x[kEta2] = -p_.d0_m * x[kThetaDot];
-  x[kOmegaL] = (x[kEta1] - half * x[kThetaDot]) / p_.wheel_radius_m;
-  x[kOmegaR] = (x[kEta1] + half * x[kThetaDot]) / p_.wheel_radius_m;
+  x[kOmegaL] = (x[kEta1] - half * x[kThetaDot]) * d_.per_radius;
+  x[kOmegaR] = (x[kEta1] + half * x[kThetaDot]) * d_.per_radius;
 }
 
 void Plant::step(double h_s, const Drive& drive, const LoadVector& begin,

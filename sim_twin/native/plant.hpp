@@ -94,7 +94,20 @@ class Plant {
   };
   SideForces side(double current_a, double omega_rad_s, double duty, double jam, double load_n_m,
                   double battery_v) const;
+  // Quotients that do not change, because a division costs as much as ten products.
+  struct Derived {
+    double per_radius, per_inductance, per_stribeck, per_charge;
+    double side_inertia;              // kg m^2, wheels and reflected rotors of one side
+    double emf_v_s, gear_n_m_a;       // V per rad/s and N m per A at the wheel
+    double weight_n;                  // m g
+    double roll_n;                    // rolling resistance of one side
+    double slide_front_n, slide_rear_n;   // sliding friction of the two front, two rear wheels
+    double per_mass_rim, per_inertia_rim; // 1 / (m + rims), 1 / (I + m d0^2 + rims): (S'MS)^-1
+  };
+
+  static Derived derive(const PlantParams& p);
   double battery_v(const StateVector& x, const Drive& drive, double sag_v) const;
+  double draw_a(const StateVector& x, const Drive& drive) const;  // from the battery
   void constrained(const StateVector& x, const SideForces* sides, const LoadVector& load,
                    const double* gravity, StateVector& dx) const;
   void slipping(const StateVector& x, const SideForces* sides, const LoadVector& load,
@@ -102,8 +115,8 @@ class Plant {
   void apply_constraint(StateVector& x) const;
 
   PlantParams p_;
+  Derived d_;
   StateVector x_{};
-  double wheel_side_inertia_;  // kg m^2, wheels and reflected rotors of one side
 };
 
 }  // namespace twin
