@@ -1,20 +1,18 @@
 """Camera poses and wheel counts fused at the exposure time, predicted to the actuation time.
 
-An extended Kalman filter on [z1_x, z1_y, theta, k_d, k_t] lives at the last exposure ("anchor").
-k_d and k_t scale distance and turn from wheel counts, so wheel radius and track need not be known
-well. Wheel reports since then are kept: a pose moves the anchor forward over them and updates it;
-between poses dead reckoning over them gives the present, and the wheel loop's lag model with the
-commands under way gives the actuation time. World frame, SI.
+The filter lives at the last exposure ("anchor"). Wheel reports since then are kept: a pose moves the
+anchor forward over them and corrects it there; between poses dead reckoning over them gives the
+latest report ("head"), and the wheel loop's lag model with the commands under way gives the
+actuation time. World frame, SI.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
+from hil.estimator.filter import DISTANCE, THETA, TURN, PoseFilter
 from hil.estimator.odometry import (
     BelievedGeometry,
     CommandHistory,
@@ -22,17 +20,26 @@ from hil.estimator.odometry import (
     counts_between,
     predict,
 )
-from hil.types import Estimate, Pose, PoseMeasurement, WheelSample, wrap_pi
+from hil.types import Estimate, Pose, PoseMeasurement, WheelSample
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from hil.config.control import EstimatorConfig
 
 # A wheel never turns this fast: a larger step of the counter is a restarted board.
 _OMEGA_IMPOSSIBLE_RAD_S = 200.0
 # Without reports for longer the board has stopped by itself: predict no further on commands.
 _HORIZON_S = 0.3
+# Gated poses whose innovations differ by less than this agree with each other (m, m, rad).
+_AGREE = (0.02, 0.02, 0.1)
+
+
+class Increment(NamedTuple):
+    """Odometry between two instants, in believed units."""
+
+    begin_s: float
+    end_s: float
+    forward_m: float
+    turn_rad: float
 
 
 class Fused:
@@ -41,31 +48,29 @@ class Fused:
     def __init__(self, config: EstimatorConfig, geometry: BelievedGeometry) -> None:
         self._config = config
         self._geometry = geometry
+        self._filter = PoseFilter(config, geometry.d0_m)
         self._speeds = WheelSpeeds(
             config.wheel_lag_s, config.sigma_accel_rad_s2, geometry.rad_per_count
         )
         self._commands = CommandHistory()
         self._last: WheelSample | None = None
-        # Increments after the anchor: (begin, end, forward, turn) in believed units.
-        self._path: deque[tuple[float, float, float, float]] = deque()
+        self._path: deque[Increment] = deque()  # after the anchor
         self._t_anchor = -math.inf
-        self._x: list[float] = [0.0, 0.0, 0.0, 1.0, 1.0]
-        self._P: NDArray[np.float64] = np.zeros((5, 5))
         self._head = (0.0, 0.0, 0.0)
         self._t_pose: float | None = None
-        self._gated_innovation: NDArray[np.float64] | None = None
+        self._gated_innovation = (0.0, 0.0, 0.0)
         self._gated_run = 0
         self.gated_total = 0
 
     @property
-    def covariance(self) -> NDArray[np.float64]:
+    def covariance(self) -> list[list[float]]:
         """Return the covariance of [z1_x, z1_y, theta, k_d, k_t] at the last exposure."""
-        return self._P.copy()
+        return [row.copy() for row in self._filter.P]
 
     @property
     def scales(self) -> tuple[float, float]:
         """Return (k_d, k_t): true over believed distance and turn of the same wheel counts."""
-        return self._x[3], self._x[4]
+        return self._filter.x[DISTANCE], self._filter.x[TURN]
 
     def pose_age_s(self, t_host_s: float) -> float:
         """Return the time since the last exposure that was believed; inf before the first."""
@@ -77,13 +82,14 @@ class Fused:
 
     def on_wheels(self, sample: WheelSample) -> None:
         """Take one wheel report (in time order; a stale one is dropped)."""
-        last, self._last = self._last, sample
+        last = self._last
         if last is None:
+            self._last = sample
             return
         dt = sample.t_host_s - last.t_host_s
         if dt <= 0.0:
-            self._last = last
             return
+        self._last = sample
         unit = self._geometry.rad_per_count
         left = unit * counts_between(last.counts_left, sample.counts_left)
         right = unit * counts_between(last.counts_right, sample.counts_right)
@@ -93,53 +99,32 @@ class Fused:
         pieces = self._commands.segments(last.t_host_s, sample.t_host_s)
         self._speeds.step(dt, (left, right), pieces)
         self._commands.forget_before(sample.t_host_s)
-        forward, turn = self._geometry.body(left, right)
-        begin = max(last.t_host_s, self._t_anchor)
-        if begin >= sample.t_host_s:
+        self._extend(last.t_host_s, sample.t_host_s, *self._geometry.body(left, right))
+        if self._path and self._path[0].begin_s < sample.t_host_s - self._config.history_s:
+            self._advance(self._path[0].end_s)
+
+    def _extend(self, begin_s: float, end_s: float, forward: float, turn: float) -> None:
+        """Append the part of an increment that lies after the anchor, and move the head over it."""
+        start = max(begin_s, self._t_anchor)
+        if start >= end_s:
             return
-        part = (sample.t_host_s - begin) / dt
-        self._path.append((begin, sample.t_host_s, part * forward, part * turn))
-        self._head = self._moved(self._head, part * forward, part * turn)
-        if self._path[0][0] < sample.t_host_s - self._config.history_s:
-            self._advance(self._path[0][1])
+        part = (end_s - start) / (end_s - begin_s)
+        forward, turn = part * forward, part * turn
+        self._path.append(Increment(start, end_s, forward, turn))
+        self._head = self._moved(self._head, forward, turn)
 
     def _moved(
         self, at: tuple[float, float, float], forward: float, turn: float
     ) -> tuple[float, float, float]:
         """Return (z1_x, z1_y, theta) after believed increments, scaled."""
-        step, d_theta = self._x[3] * forward, self._x[4] * turn
+        x = self._filter.x
+        step, d_theta = x[DISTANCE] * forward, x[TURN] * turn
         middle = at[2] + 0.5 * d_theta
         return at[0] + step * math.cos(middle), at[1] + step * math.sin(middle), at[2] + d_theta
 
-    def _advance(self, t_s: float) -> None:
-        """Move the anchor to t_s over the wheel increments, the last one cut at t_s."""
-        path = self._path
-        forward = turn = path_length = path_turn = 0.0
-        begin = self._t_anchor
-        if self._last is not None and t_s > self._last.t_host_s:
-            self._bridge(t_s)
-        while path and path[0][0] < t_s:
-            start, end, step, angle = path.popleft()
-            if end > t_s:
-                part = (t_s - start) / (end - start)
-                path.appendleft((t_s, end, step * (1.0 - part), angle * (1.0 - part)))
-                step, angle = step * part, angle * part
-            forward, turn = forward + step, turn + angle
-            path_length, path_turn = path_length + abs(step), path_turn + abs(angle)
-        self._t_anchor = t_s
-        if begin > -math.inf:
-            self._propagate(t_s - begin, forward, turn, path_length, path_turn)
-
-    def _bridge(self, t_s: float) -> None:
-        """Extend the path to t_s beyond the last report, on the commands under way."""
-        left, right, _, _ = self._ahead(t_s)
-        begin = self._t_head
-        if begin < t_s:
-            self._path.append((begin, t_s, *self._geometry.body(left, right)))
-
     @property
     def _t_head(self) -> float:
-        """Return the time up to which motion is known from reports (or from the last pose)."""
+        """Return the time up to which motion is known, from a report or a pose."""
         reported = -math.inf if self._last is None else self._last.t_host_s
         return max(reported, self._t_anchor)
 
@@ -150,25 +135,26 @@ class Fused:
         left, right = self._speeds.omega
         return predict(pieces, left, right, self._config.wheel_lag_s)
 
-    def _propagate(
-        self, dt_s: float, forward: float, turn: float, length: float, angle: float
-    ) -> None:
-        """Move state and covariance at the anchor over one increment."""
-        x, config = self._x, self._config
-        middle = x[2] + 0.5 * x[4] * turn
-        c, s = math.cos(middle), math.sin(middle)
-        step = x[3] * forward
-        F = np.eye(5)
-        F[0, 2:] = (-step * s, forward * c, -0.5 * step * s * turn)
-        F[1, 2:] = (step * c, forward * s, 0.5 * step * c * turn)
-        F[2, 4] = turn
-        self._P = F @ self._P @ F.T
-        slip2 = config.slip_ratio**2
-        noise = self._P.diagonal().copy()
-        noise[:2] += slip2 * length + config.drift_m_s05**2 * dt_s
-        noise[2] += slip2 * (angle + length) + config.drift_rad_s05**2 * dt_s
-        np.fill_diagonal(self._P, noise)
-        x[0], x[1], x[2] = x[0] + step * c, x[1] + step * s, x[2] + x[4] * turn
+    def _advance(self, t_s: float) -> None:
+        """Move the anchor to t_s over the increments, the last one cut there."""
+        if self._t_anchor > -math.inf and t_s > self._t_head:
+            left, right, _, _ = self._ahead(t_s)
+            self._extend(self._t_head, t_s, *self._geometry.body(left, right))
+        path = self._path
+        forward = turn = length = angle = 0.0
+        while path and path[0].begin_s < t_s:
+            first = path.popleft()
+            step, d_theta = first.forward_m, first.turn_rad
+            if first.end_s > t_s:
+                part = (t_s - first.begin_s) / (first.end_s - first.begin_s)
+                rest = 1.0 - part
+                path.appendleft(Increment(t_s, first.end_s, step * rest, d_theta * rest))
+                step, d_theta = step * part, d_theta * part
+            forward, turn = forward + step, turn + d_theta
+            length, angle = length + abs(step), angle + abs(d_theta)
+        if self._t_pose is not None:
+            self._filter.move(t_s - self._t_anchor, forward, turn, (length, angle))
+        self._t_anchor = t_s
 
     def on_pose(self, t_exposure_s: float, measurement: PoseMeasurement) -> None:
         """Take the pose seen at `t_exposure_s` in the past; older than the last one is dropped."""
@@ -177,93 +163,50 @@ class Fused:
             return
         self._advance(t_exposure_s)
         if self._t_pose is None:
-            self._start(t_exposure_s, pose, measurement)
+            self._place(t_exposure_s, pose, measurement)
         else:
-            self._update(t_exposure_s, pose, measurement)
-        self._head = (self._x[0], self._x[1], self._x[2])
-        for _, _, forward, turn in self._path:
-            self._head = self._moved(self._head, forward, turn)
+            self._correct(t_exposure_s, pose, measurement)
+        x = self._filter.x
+        self._head = (x[0], x[1], x[THETA])
+        for increment in self._path:
+            self._head = self._moved(self._head, increment.forward_m, increment.turn_rad)
 
-    def _start(self, t_s: float, pose: Pose, measurement: PoseMeasurement) -> None:
-        """Set the anchor on a pose; the scales keep what is known of them."""
-        d0, theta = self._geometry.d0_m, pose.theta_rad
-        if self._t_pose is not None:
-            theta = self._x[2] + wrap_pi(theta - self._x[2])
-        self._x[0] = pose.x_m + d0 * math.cos(theta)
-        self._x[1] = pose.y_m + d0 * math.sin(theta)
-        self._x[2] = theta
-        scales = (
-            self._P[3:, 3:].diagonal()
-            if self._t_pose is not None
-            else np.full(2, self._config.sigma_scale**2)
-        )
-        s_xy, s_theta = measurement.sigma_xy_m, measurement.sigma_theta_rad
-        self._P = np.diag((s_xy**2, s_xy**2, s_theta**2, *scales))
+    def _place(self, t_s: float, pose: Pose, measurement: PoseMeasurement) -> None:
+        """Set the anchor on a pose."""
+        self._filter.place(pose, measurement.sigma_xy_m, measurement.sigma_theta_rad)
         self._t_pose = t_s
         self._gated_run = 0
 
-    def _update(self, t_s: float, pose: Pose, measurement: PoseMeasurement) -> None:
-        """Correct the anchor by a pose, unless it lies outside the gate."""
-        x, P, config = self._x, self._P, self._config
-        d0 = self._geometry.d0_m
-        c, s = math.cos(x[2]), math.sin(x[2])
-        innovation = np.array(
-            (
-                pose.x_m - (x[0] - d0 * c),
-                pose.y_m - (x[1] - d0 * s),
-                wrap_pi(pose.theta_rad - x[2]),
-            )
-        )
-        # h(x) = [z1 - d0 e(theta), theta], so H is the identity but for the theta column.
-        HP = P[:3] + np.outer((d0 * s, -d0 * c, 0.0), P[2])
-        S = HP[:, :3].copy()
-        S += np.outer(HP[:, 2], (d0 * s, -d0 * c, 0.0))
+    def _correct(self, t_s: float, pose: Pose, measurement: PoseMeasurement) -> None:
+        """Correct the anchor by a pose; a run of gated poses that agree moves it there instead."""
+        config = self._config
         eta1, w = self._geometry.body(*self._speeds.omega)
-        blur_xy2 = (config.sigma_time_s * eta1) ** 2
-        R_xy = measurement.sigma_xy_m**2 + blur_xy2
-        S[0, 0] += R_xy
-        S[1, 1] += R_xy
-        S[2, 2] += measurement.sigma_theta_rad**2 + (config.sigma_time_s * w) ** 2
-        S_inv_HP = np.linalg.solve(S, HP)
-        if float(innovation @ np.linalg.solve(S, innovation)) > config.gate_chi2:
-            self._gate(t_s, pose, measurement, innovation)
+        innovation = self._filter.innovation(pose)
+        # An exposure dated wrongly by sigma_time looks like an error along the motion.
+        var_xy = measurement.sigma_xy_m**2 + (config.sigma_time_s * eta1) ** 2
+        var_theta = measurement.sigma_theta_rad**2 + (config.sigma_time_s * w) ** 2
+        if self._filter.correct(innovation, var_xy, var_theta, config.gate_chi2):
+            self._t_pose = t_s
+            self._gated_run = 0
             return
-        gain_step = innovation @ S_inv_HP
-        for index in range(5):
-            x[index] += float(gain_step[index])
-        P = P - HP.T @ S_inv_HP
-        self._P = 0.5 * (P + P.T)
-        self._t_pose = t_s
-        self._gated_run = 0
-
-    def _gate(
-        self,
-        t_s: float,
-        pose: Pose,
-        measurement: PoseMeasurement,
-        innovation: NDArray[np.float64],
-    ) -> None:
-        """Count a gated pose; a run of them that agree with each other moves the anchor there."""
         self.gated_total += 1
         previous, self._gated_innovation = self._gated_innovation, innovation
-        agree = (
-            self._gated_run > 0
-            and previous is not None
-            and bool(np.all(np.abs(innovation - previous) < (0.02, 0.02, 0.1)))
+        agree = self._gated_run > 0 and all(
+            abs(a - b) < limit for a, b, limit in zip(innovation, previous, _AGREE, strict=True)
         )
         self._gated_run = self._gated_run + 1 if agree else 1
-        if self._gated_run >= self._config.reacquire_poses:
-            self._start(t_s, pose, measurement)
+        if self._gated_run >= config.reacquire_poses:
+            self._place(t_s, pose, measurement)
 
     def estimate_at(self, t_host_s: float) -> Estimate | None:
         """Return the state predicted to `t_host_s`; None before the first pose."""
         if self._t_pose is None:
             return None
-        geometry = self._geometry
+        geometry, scale = self._geometry, self._filter.x
         turned_left, turned_right, left, right = self._ahead(t_host_s)
         x, y, theta = self._moved(self._head, *geometry.body(turned_left, turned_right))
         forward, turn = geometry.body(left, right)
-        eta1, w = self._x[3] * forward, self._x[4] * turn
+        eta1, w = scale[DISTANCE] * forward, scale[TURN] * turn
         c, s = math.cos(theta), math.sin(theta)
         pose = Pose(x - geometry.d0_m * c, y - geometry.d0_m * s, theta)
         return Estimate(t_host_s, pose, eta1, w, (x, y), (eta1 * c, eta1 * s))

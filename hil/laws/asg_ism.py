@@ -59,6 +59,16 @@ class AsgIsm:
         delta3, _ = self._backstep(reference, estimate, self._chain.state(estimate))
         self._gamma = (-self._gains.mu0_s * delta3[0], -self._gains.mu0_s * delta3[1])
 
+    @property
+    def delta4_m_s(self) -> Vec2:
+        """Return the integral of delta3 (8.13), the argument of the cost H."""
+        return self._delta4
+
+    @property
+    def gamma_m_s(self) -> Vec2:
+        """Return gamma of (8.17)."""
+        return self._gamma
+
     def _backstep(
         self, reference: ReferenceState, estimate: Estimate, state: ChainState
     ) -> tuple[Vec2, Vec2]:

@@ -159,3 +159,15 @@ def restrict(value: Vec2, rate: Vec2, accel: Vec2, limit: float | None) -> tuple
         (qd * x + q * xd, qd * y + q * yd),
         (qdd * x + 2.0 * qd * xd + q * xdd, qdd * y + 2.0 * qd * yd + q * ydd),
     )
+
+
+def authority(value: Vec2, limit: float | None) -> float:
+    """Return how much of a change along `value` passes `restrict`: q^3, 1 inside and 0 far out.
+
+    An integrator that acts through the restriction grows by this share, so that it does not wind up
+    over an approach at the speed limit.
+    """
+    if limit is None:
+        return 1.0
+    q = 1.0 / math.sqrt(1.0 + (value[0] * value[0] + value[1] * value[1]) / (limit * limit))
+    return q * q * q

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from hil.laws.chain import Chain, restrict
+from hil.laws.chain import Chain, authority, restrict
 from hil.laws.trace import make_trace
 from hil.types import OuterCommand
 
@@ -59,5 +59,6 @@ class StateFeedback:
         jerk = (jx_ref - kd2 * (ax - ax_ref + r[0]), jy_ref - kd2 * (ay - ay_ref + r[1]))
         out = self._chain.command(jerk, state, dt_s)
         if not out.saturated:
-            self._integral = (ix + d1x * dt_s, iy + d1y * dt_s)
+            grow = dt_s * authority(position, limits.approach_speed_m_s)
+            self._integral = (ix + d1x * grow, iy + d1y * grow)
         return OuterCommand(out.eta1, out.w, make_trace(state, out, self._d0))

@@ -1,0 +1,118 @@
+"""The extended Kalman filter of the default estimator, in plain floats (it runs every frame).
+
+State x = [z1_x, z1_y, theta, k_d, k_t]: flat output point and heading in the world, scales of the
+distance and turn that wheel counts claim. World frame, SI.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from hil.types import Pose, wrap_pi
+
+if TYPE_CHECKING:
+    from hil.config.control import EstimatorConfig
+
+Row = list[float]
+THETA, DISTANCE, TURN = 2, 3, 4
+
+
+class PoseFilter:
+    """Mean `x` and covariance `P` at one instant."""
+
+    def __init__(self, config: EstimatorConfig, d0_m: float) -> None:
+        self._config = config
+        self._d0 = d0_m
+        self.x: Row = [0.0, 0.0, 0.0, 1.0, 1.0]
+        scale2 = config.sigma_scale**2
+        self.P: list[Row] = [[0.0] * 5 for _ in range(5)]
+        self.P[DISTANCE][DISTANCE] = self.P[TURN][TURN] = scale2
+
+    def place(self, pose: Pose, sigma_xy_m: float, sigma_theta_rad: float) -> None:
+        """Start at a pose; what is known of the scales is kept, and theta stays unwrapped."""
+        x, P = self.x, self.P
+        theta = x[THETA] + wrap_pi(pose.theta_rad - x[THETA])
+        x[0] = pose.x_m + self._d0 * math.cos(theta)
+        x[1] = pose.y_m + self._d0 * math.sin(theta)
+        x[THETA] = theta
+        for i, sigma in enumerate((sigma_xy_m, sigma_xy_m, sigma_theta_rad)):
+            P[i] = [0.0] * 5
+            for row in P:
+                row[i] = 0.0
+            P[i][i] = sigma * sigma
+
+    def move(
+        self, dt_s: float, forward_m: float, turn_rad: float, path: tuple[float, float]
+    ) -> None:
+        """Carry mean and covariance over one increment of odometry (believed units).
+
+        The point moves along the heading half-way through the turn. `path` is the distance and the
+        turn with all signs positive: noise grows with what was travelled, not with the net of it.
+        """
+        x, P, config = self.x, self.P, self._config
+        middle = x[THETA] + 0.5 * x[TURN] * turn_rad
+        c, s = math.cos(middle), math.sin(middle)
+        step = x[DISTANCE] * forward_m
+        # F = 1 + G, with G the rows below on the columns theta, k_d, k_t.
+        rows = (
+            (0, -step * s, forward_m * c, -0.5 * step * s * turn_rad),
+            (1, step * c, forward_m * s, 0.5 * step * c * turn_rad),
+            (THETA, 0.0, 0.0, turn_rad),
+        )
+        for i, g2, g3, g4 in rows:
+            P[i] = [
+                a + g2 * b + g3 * d + g4 * e
+                for a, b, d, e in zip(P[i], P[THETA], P[DISTANCE], P[TURN], strict=True)
+            ]
+        for i, g2, g3, g4 in rows:
+            for row in P:
+                row[i] += g2 * row[THETA] + g3 * row[DISTANCE] + g4 * row[TURN]
+        slip2 = config.slip_ratio**2
+        position_noise = slip2 * path[0] + config.drift_m_s05**2 * dt_s
+        P[0][0] += position_noise
+        P[1][1] += position_noise
+        P[THETA][THETA] += slip2 * (path[0] + path[1]) + config.drift_rad_s05**2 * dt_s
+        x[0] += step * c
+        x[1] += step * s
+        x[THETA] += x[TURN] * turn_rad
+
+    def innovation(self, pose: Pose) -> tuple[float, float, float]:
+        """Return the pose seen minus the pose expected: h(x) = [z1 - d0 e(theta), theta]."""
+        x, d0 = self.x, self._d0
+        return (
+            pose.x_m - x[0] + d0 * math.cos(x[THETA]),
+            pose.y_m - x[1] + d0 * math.sin(x[THETA]),
+            wrap_pi(pose.theta_rad - x[THETA]),
+        )
+
+    def correct(
+        self, innovation: tuple[float, float, float], var_xy: float, var_theta: float, gate: float
+    ) -> bool:
+        """Take the innovation unless its squared Mahalanobis distance exceeds `gate`.
+
+        The three components are independent, so they are taken one after the other; the sum of
+        their normalised squares is the distance of the whole.
+        """
+        d0, theta = self._d0, self.x[THETA]
+        slopes = (d0 * math.sin(theta), -d0 * math.cos(theta), 0.0)  # dh/dtheta beside the identity
+        P = self.P
+        change = [0.0] * 5
+        distance2 = 0.0
+        for i, variance in enumerate((var_xy, var_xy, var_theta)):
+            slope = slopes[i]
+            ph = [row[i] + slope * row[THETA] for row in P]
+            total = ph[i] + slope * ph[THETA] + variance
+            left = innovation[i] - change[i] - slope * change[THETA]
+            distance2 += left * left / total
+            if distance2 > gate:
+                return False
+            gain = [value / total for value in ph]
+            change = [a + k * left for a, k in zip(change, gain, strict=True)]
+            P = [
+                [a - k * b for a, b in zip(row, ph, strict=True)]
+                for row, k in zip(P, gain, strict=True)
+            ]
+        self.P = P
+        self.x = [a + b for a, b in zip(self.x, change, strict=True)]
+        return True
