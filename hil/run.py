@@ -8,6 +8,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vision.marks import MarkLocaliser
+
 from hil import _firmware
 from hil.clocks import CameraClock
 from hil.errors import BadInput
@@ -22,7 +24,6 @@ from hil.session import Parts, Progress, Session
 from hil.targets import open_rig
 from hil.wire.identity import board_hashes
 from hil.wire.link import BoardLink
-from vision.marks import MarkLocaliser
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario

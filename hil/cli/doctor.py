@@ -12,13 +12,13 @@ def command(as_json: bool) -> None:
 
     Ends with status 0 whatever is missing: not every target needs every tool.
     """
-    from hil import doctor  # noqa: PLC0415 - `hil --help` must not load it
+    from hil import doctor
 
     findings = doctor.examine()
     if as_json:
         print_json(doctor.as_document(findings))
         return
-    from rich.console import Console  # noqa: PLC0415
+    from rich.console import Console
 
     console = Console(highlight=False)
     console.print(doctor.as_table(findings))

@@ -11,7 +11,6 @@ from hil.cli.options import (
     inner_option,
     json_option,
     out_option,
-    print_json,
     seed_option,
     set_option,
     target_option,
@@ -46,11 +45,11 @@ def command(
     DECK is the built-in deck `thesis` (the three experiments) or a TOML file with `scenarios` and
     `laws`. Both laws of a scenario get the same seed: the same noise, delays and losses.
     """
-    from hil.config.deck import load_deck  # noqa: PLC0415 - keep `hil --help` fast
-    from hil.experiment import Conditions, deck_specs, run_all, run_name  # noqa: PLC0415
-    from hil.record.manifest import command_line  # noqa: PLC0415
-    from hil.record.reader import read_run  # noqa: PLC0415
-    from hil.run import exit_status, new_folder  # noqa: PLC0415
+    from hil.config.deck import load_deck
+    from hil.experiment import Conditions, deck_specs, run_all, run_name
+    from hil.record.manifest import command_line
+    from hil.record.reader import read_run
+    from hil.run import exit_status, new_folder
 
     conditions = Conditions(target, camera, inner, seed, repeats, overrides, command_line())
     folder = out or new_folder("experiment")

@@ -11,8 +11,8 @@ Update = Callable[[str, float], None]
 @contextmanager
 def run_progress(durations_s: Mapping[str, float]) -> Iterator[Update]:
     """Show one bar per run; `update(name, t_s)` moves it. Nothing is shown off a terminal."""
-    from rich.console import Console  # noqa: PLC0415 - keep `hil --help` fast
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
     columns = (

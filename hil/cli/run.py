@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -53,9 +54,9 @@ def command(
 
     Built in: scenario-1, scenario-2, scenario-3 (the three experiments) and circle (section 8.9).
     """
-    from hil.config.load import load_scenario  # noqa: PLC0415 - keep `hil --help` fast
-    from hil.record.manifest import command_line  # noqa: PLC0415
-    from hil.run import RunSpec, execute, exit_status, new_folder  # noqa: PLC0415
+    from hil.config.load import load_scenario
+    from hil.record.manifest import command_line
+    from hil.run import RunSpec, execute, exit_status, new_folder
 
     resolved = load_scenario(scenario, overrides)
     spec = RunSpec(
@@ -76,7 +77,7 @@ def command(
     else:
         print_summary(record)
     if view:
-        from hil.cli.view import open_viewer  # noqa: PLC0415
+        from hil.cli.view import open_viewer
 
         open_viewer([record.path])
     return exit_status(record)
@@ -103,12 +104,12 @@ def summary(record: RunRecord) -> dict[str, Any]:
 
 
 def _finite(value: float) -> float | None:
-    return value if value == value else None
+    return value if math.isfinite(value) else None
 
 
 def print_summary(record: RunRecord) -> None:
     """Write outcome, requirements and the place of the record to stdout."""
-    from rich.console import Console  # noqa: PLC0415
+    from rich.console import Console
 
     console = Console(highlight=False, soft_wrap=True)
     manifest = record.manifest

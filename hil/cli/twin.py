@@ -28,7 +28,7 @@ def command() -> None:
               help="End by itself after this time. [default: at Ctrl-C]")  # fmt: skip
 @seed_option
 @set_option
-def serve(  # noqa: PLR0917 - click passes them by name
+def serve(
     scenario: str,
     pty: Path,
     frames: Path,
@@ -47,9 +47,9 @@ def serve(  # noqa: PLR0917 - click passes them by name
     Timed disturbances and faults of the scenario count from each arming.
     """  # noqa: D301 - \b is click's mark for a verbatim paragraph
     # `hil --help` must not load the twin.
-    from hil.config.load import load_scenario  # noqa: PLC0415
-    from hil.serve import TwinServer  # noqa: PLC0415
-    from hil.targets import open_rig  # noqa: PLC0415
+    from hil.config.load import load_scenario
+    from hil.serve import TwinServer
+    from hil.targets import open_rig
 
     rig = open_rig("twin", load_scenario(scenario, overrides), camera, seed)
     server = TwinServer(rig, pty, frames)
