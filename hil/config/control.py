@@ -129,7 +129,7 @@ class EstimatorConfig(Section):
         0.06, gt=0, le=0.5, description="s, first-order lag of the wheel loop, for the prediction"
     )
     sigma_accel_rad_s2: float = Field(
-        20.0, gt=0, le=1e4, description="rad/s^2, wheel acceleration the lag model misses (1 sigma)"
+        6.0, gt=0, le=1e4, description="rad/s^2, wheel acceleration the lag model misses (1 sigma)"
     )
     sigma_scale: float = Field(
         0.15, gt=0, le=1, description="ratio, prior 1 sigma of the distance and turn scales"

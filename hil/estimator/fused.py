@@ -198,13 +198,30 @@ class Fused:
         if self._gated_run >= config.reacquire_poses:
             self._place(t_s, pose, measurement)
 
+    def _back_at(self, t_s: float) -> tuple[float, float, float]:
+        """Return (z1_x, z1_y, theta) at a time before the head, not before the anchor."""
+        x = self._filter.x
+        at = (x[0], x[1], x[THETA])
+        for begin, end, forward, turn in self._path:
+            if begin >= t_s:
+                break
+            part = min((t_s - begin) / (end - begin), 1.0)
+            at = self._moved(at, part * forward, part * turn)
+        return at
+
     def estimate_at(self, t_host_s: float) -> Estimate | None:
-        """Return the state predicted to `t_host_s`; None before the first pose."""
+        """Return the state at `t_host_s`, past the last exposure; None before the first pose.
+
+        Speeds are predicted; for a time already passed they are those of the latest report.
+        """
         if self._t_pose is None:
             return None
         geometry, scale = self._geometry, self._filter.x
         turned_left, turned_right, left, right = self._ahead(t_host_s)
-        x, y, theta = self._moved(self._head, *geometry.body(turned_left, turned_right))
+        if t_host_s < self._t_head:
+            x, y, theta = self._back_at(t_host_s)
+        else:
+            x, y, theta = self._moved(self._head, *geometry.body(turned_left, turned_right))
         forward, turn = geometry.body(left, right)
         eta1, w = scale[DISTANCE] * forward, scale[TURN] * turn
         c, s = math.cos(theta), math.sin(theta)

@@ -1,0 +1,219 @@
+"""The default estimator: delay, mismatch, gating, lost signals."""
+
+import math
+import time
+
+import pytest
+
+from hil.config.control import EstimatorConfig
+from hil.errors import BadInput
+from hil.estimator import BelievedGeometry, make_estimator
+from hil.types import Pose, PoseMeasurement, WheelSample
+from tests.estimator.world import LAG_S, TRUE, Conditions, World
+
+USUAL = Conditions()
+CONFIG = EstimatorConfig(wheel_lag_s=LAG_S)
+# The host believes 10 % less radius and 10 % more track than is true: turns are 22 % off.
+WRONG = BelievedGeometry(TRUE.wheel_radius_m / 1.1, TRUE.track_width_m / 0.9, TRUE.d0_m, 1920)
+
+
+def weave(t):
+    """Return a lively motion: speed and turn rate both change all the time."""
+    return 0.25 + 0.15 * math.sin(1.7 * t), 1.2 * math.sin(1.1 * t)
+
+
+def make(believed=TRUE, conditions=USUAL, config=CONFIG, **k):
+    estimator = make_estimator("fused", config, believed)
+    return estimator, World(estimator, believed, conditions, **k)
+
+
+def position_errors(moments):
+    return [
+        math.hypot(m.estimate.z1_m[0] - m.x, m.estimate.z1_m[1] - m.y)
+        for m in moments
+        if m.estimate
+    ]
+
+
+def test_exact_sensors_and_geometry_leave_only_quantisation():
+    """Despite 60 ms camera and 20 ms link delay the state at the effect time is right."""
+    _, world = make(conditions=Conditions(exact=True))
+    late = world.run(8.0, weave)[60:]
+    # One encoder count is 0.158 mm of wheel path; speed noise from it is a few mm/s.
+    assert max(position_errors(late)) < 0.002
+    assert max(abs(m.estimate.pose.theta_rad - m.theta) for m in late) < 0.004
+    assert max(abs(m.estimate.eta1_m_s - m.eta1) for m in late) < 0.01
+    assert max(abs(m.estimate.theta_dot_rad_s - m.w) for m in late) < 0.10
+
+
+def test_ignoring_the_delay_would_be_seen(monkeypatch):
+    """Negative control: poses taken as of their arrival are off by delay times speed."""
+    estimator, world = make(conditions=Conditions(exact=True))
+    right = estimator.on_pose
+    monkeypatch.setattr(estimator, "on_pose", lambda t, m: right(t + 0.06, m))
+    late = world.run(6.0, lambda _: (0.4, 0.0))[60:]
+    assert max(position_errors(late)) > 0.015
+
+
+def test_scales_absorb_ten_percent_of_radius_and_track():
+    """k_d tends to 1.1 and k_t to 1.1/0.9, and the prediction is as good as with the true robot."""
+    estimator, world = make(WRONG)
+    late = world.run(15.0, weave)[300:]
+    k_d, k_t = estimator.scales
+    assert k_d == pytest.approx(1.1, abs=0.015)
+    assert k_t == pytest.approx(1.1 / 0.9, abs=0.02)
+    errors = position_errors(late)
+    assert math.sqrt(sum(e * e for e in errors) / len(errors)) < 0.003
+
+
+def test_estimate_of_a_resting_robot_is_quieter_than_the_camera():
+    """At rest the wheels say so, and a second of poses averages out: no limit cycle from noise."""
+    _, world = make()
+    world.run(3.0, lambda _: (0.0, 0.0))
+    late = world.run(5.0, lambda _: (0.0, 0.0))
+    xs = [m.estimate.z1_m[0] for m in late]
+    mean = sum(xs) / len(xs)
+    assert math.sqrt(sum((x - mean) ** 2 for x in xs) / len(xs)) < 0.5e-3
+    assert max(abs(m.estimate.eta1_m_s) for m in late) < 1e-3
+
+
+def test_covariance_is_consistent_with_the_errors():
+    """Normalised squared position errors average near 2 (two axes), not ten times off."""
+    estimator, world = make()
+    squares = []
+
+    def collect(moment):
+        if moment.estimate and moment.t_s > 3.0:
+            P = estimator.covariance
+            ex, ey = moment.estimate.z1_m[0] - moment.x, moment.estimate.z1_m[1] - moment.y
+            squares.append(ex * ex / P[0][0] + ey * ey / P[1][1])
+
+    world.run(12.0, weave, collect)
+    assert 0.2 < sum(squares) / len(squares) < 8.0
+
+
+def test_an_implausible_pose_is_gated_and_changes_nothing():
+    """One pose 0.3 m off (marks swapped with a reflection) moves the estimate by nothing."""
+    estimator, world = make(conditions=Conditions(exact=True))
+    world.run(3.0, weave)
+    before = estimator.estimate_at(world.t)
+    wrong = PoseMeasurement(Pose(before.pose.x_m + 0.3, before.pose.y_m, 0.0), 1.0)
+    estimator.on_pose(world.t - 0.005, wrong)
+    after = estimator.estimate_at(world.t)
+    assert estimator.gated_total == 1
+    assert after.z1_m == pytest.approx(before.z1_m, abs=1e-3)
+
+
+def test_a_moved_robot_is_found_again():
+    """Lifted and put down 0.3 m away: after five agreeing poses the estimate is there."""
+    estimator, world = make()
+    world.run(3.0, lambda _: (0.1, 0.0))
+    world.z[0] += 0.3
+    world.z[2] += 0.8
+    late = world.run(1.0, lambda _: (0.1, 0.0))
+    assert 4 <= estimator.gated_total <= 6
+    assert position_errors(late)[-1] < 0.005
+
+
+def test_scattered_wrong_poses_are_never_believed():
+    """Wrong poses that disagree with each other do not add up to a recovery."""
+    estimator, world = make()
+    world.run(3.0, lambda _: (0.0, 0.0))
+    before = estimator.estimate_at(world.t)
+    for k in range(40):
+        jump = 0.3 + 0.1 * (k % 3)
+        wrong = PoseMeasurement(Pose(before.pose.x_m + jump, before.pose.y_m, 0.0), 1.0)
+        estimator.on_pose(world.t - 0.03 + k / 30, wrong)
+    assert estimator.gated_total == 40
+    assert estimator.estimate_at(world.t + 1.3).z1_m == pytest.approx(before.z1_m, abs=2e-3)
+
+
+def test_lost_camera_is_bridged_by_the_wheels_and_its_age_is_told():
+    """One second without a pose at 0.4 m/s: the error stays in the millimetres."""
+    estimator, world = make(WRONG)
+    world.run(12.0, weave)
+    world.camera_on = False
+    late = world.run(1.0, weave)
+    assert 0.9 < estimator.pose_age_s(world.t) < 1.2
+    assert position_errors(late)[-1] < 0.015
+
+
+def test_lost_wheel_reports_are_bridged_by_the_commands():
+    """Reports missing for 0.2 s: command history and lag model carry the state."""
+    _, world = make()
+    world.run(4.0, weave)
+    world.link_on = False
+    world.run(0.2, weave)
+    world.link_on = True
+    late = world.run(1.0, weave)
+    assert max(position_errors(late)) < 0.008
+
+
+def test_restarted_board_is_noticed():
+    """Counters that fall to zero are not taken for motion."""
+    estimator, world = make()
+    world.run(4.0, lambda _: (0.3, 0.0))
+    world.board_restarts_at = world.t
+    late = world.run(1.0, lambda _: (0.3, 0.0))
+    assert position_errors(late)[-1] < 0.005
+    assert estimator.gated_total == 0
+
+
+def test_nothing_is_said_before_the_first_pose():
+    """Wheel reports alone give no estimate; the age of the pose is infinite."""
+    estimator = make_estimator("fused", CONFIG, TRUE)
+    estimator.on_wheels(WheelSample(0.0, 0, 0, 0.0, 0.0))
+    estimator.on_wheels(WheelSample(0.02, 5, 5, 0.0, 0.0))
+    assert estimator.estimate_at(0.05) is None
+    assert estimator.pose_age_s(0.05) == math.inf
+    estimator.on_pose(0.01, PoseMeasurement(None, 0.0, "not seen"))
+    assert estimator.estimate_at(0.05) is None
+
+
+def test_heading_is_unwrapped_over_several_turns():
+    """Turning on the spot for three turns, theta passes 2 pi each time without a jump."""
+    _, world = make()
+    moments = world.run(10.0, lambda _: (0.0, 2.0))
+    assert moments[-1].theta > 5 * math.pi
+    assert max(abs(m.estimate.pose.theta_rad - m.theta) for m in moments[10:]) < 0.05
+
+
+def test_same_inputs_give_the_same_estimates():
+    """The estimator is a pure function of its inputs."""
+    runs = [make(WRONG)[1].run(2.0, weave) for _ in range(2)]
+    assert [m.estimate for m in runs[0]] == [m.estimate for m in runs[1]]
+
+
+def test_a_tick_is_cheap():
+    """One pose, two reports, one estimate, one command: well under a millisecond."""
+    estimator, world = make()
+    world.run(1.0, weave)
+    best = math.inf
+    for k in range(200):
+        t = world.t + k / 30
+        begin = time.perf_counter()
+        for half in (0, 1):
+            estimator.on_wheels(WheelSample(t + half / 60, 0, 0, 0.0, 0.0))
+        estimator.on_pose(t - 0.05, PoseMeasurement(Pose(0.0, 0.0, 0.0), 1.0))
+        estimator.estimate_at(t + 0.02)
+        estimator.on_command(t + 0.02, 0.0, 0.0)
+        best = min(best, time.perf_counter() - begin)
+    assert best < 500e-6
+
+
+def test_unknown_estimator_is_refused_by_name():
+    """The message names the value and the choice."""
+    with pytest.raises(BadInput, match=r"'magic'.*fused, camera-only"):
+        make_estimator("magic", CONFIG, TRUE)
+
+
+def test_a_time_just_passed_is_answered_from_the_path():
+    """Asked for the last exposure itself, the estimate is where the robot was then."""
+    estimator, world = make(conditions=Conditions(exact=True))
+    track = []
+    world.run(4.0, lambda _: (0.4, 0.5), lambda m: track.append((m.t_s, m.x, m.y)))
+    t, x, y = track[-2]  # about 40 ms ago, after the anchor
+    here = estimator.estimate_at(t)
+    assert math.hypot(here.z1_m[0] - x, here.z1_m[1] - y) < 0.003
+    ahead = estimator.estimate_at(world.t + 0.02)
+    assert math.hypot(ahead.z1_m[0] - x, ahead.z1_m[1] - y) > 0.015
