@@ -1,0 +1,102 @@
+"""The project's own speed figures on this machine: medians of several runs, never a test."""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from hil.config.load import load_scenario
+from hil.run import RunSpec, execute
+
+_SCENARIO = "scenario-1"
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One speed figure: median, least and largest of `runs` runs; `goal` is what it should reach."""
+
+    name: str
+    unit: str
+    median: float
+    least: float
+    largest: float
+    runs: int
+    goal: str
+
+
+def measure(name: str, unit: str, goal: str, runs: int, once: Callable[[], float]) -> Figure:
+    """Return the figure of `once`, called `runs` times after one call that is not counted."""
+    once()
+    values = sorted(once() for _ in range(runs))
+    return Figure(name, unit, statistics.median(values), values[0], values[-1], runs, goal)
+
+
+def real_time_factor(camera: str, *, record: bool = True) -> float:
+    """Return simulated seconds per wall second of one whole run, record included.
+
+    The simulated time is that of the controlled part; connecting and stopping come on top of it.
+    """
+    scenario = load_scenario(_SCENARIO)
+    with tempfile.TemporaryDirectory() as folder:
+        spec = RunSpec(
+            scenario=scenario,
+            target="twin",
+            camera=camera,
+            outer="asg-ism",
+            inner="asg-ism",
+            seed=1,
+            out=Path(folder) / "run",
+            rerun=record,
+            command="hil bench",
+        )
+        start_s = time.perf_counter()
+        execute(spec)
+        return scenario.duration_s / (time.perf_counter() - start_s)
+
+
+def kernel_step_us() -> float:
+    """Return microseconds of wall time per 1e-4 s step of plant, firmware and encoders."""
+    from random import Random  # noqa: PLC0415 - only for this figure
+
+    from sim_twin.setup import STEP_US, make_kernel  # noqa: PLC0415
+
+    kernel = make_kernel(load_scenario(_SCENARIO).robot, 57_600, Random(1))
+    steps = 50_000
+    start_s = time.perf_counter()
+    end_us = steps * STEP_US
+    while kernel.advance(end_us) < end_us:
+        kernel.take_sent()
+    return (time.perf_counter() - start_s) / steps * 1e6
+
+
+def help_s() -> float:
+    """Return the wall time of `hil --help` as a process of its own."""
+    start_s = time.perf_counter()
+    subprocess.run([sys.executable, "-m", "hil", "--help"], check=True, stdout=subprocess.DEVNULL)
+    return time.perf_counter() - start_s
+
+
+def figures(runs: int) -> list[Figure]:
+    """Return every figure; some tens of seconds in all."""
+    return [
+        measure("whole loop, rendered camera", "x real time", ">= 10", runs,
+                lambda: real_time_factor("rendered")),
+        measure("whole loop, --camera pose", "x real time", ">= 100", runs,
+                lambda: real_time_factor("pose", record=False)),
+        measure("whole loop, --camera pose, with Rerun file", "x real time", "", runs,
+                lambda: real_time_factor("pose")),
+        measure("twin and firmware, one step of 1e-4 s", "us", "<= 0.4", runs, kernel_step_us),
+        measure("hil --help", "s", "< 0.3", runs, help_s),
+    ]  # fmt: skip
+
+
+def as_document(found: list[Figure]) -> dict[str, Any]:
+    """Return what `hil bench --json` prints."""
+    return {"figures": [asdict(figure) for figure in found]}
