@@ -83,14 +83,14 @@ def test_a_parameter_the_board_does_not_have_ends_the_bring_up():
 
 
 def test_armed_wheels_follow_and_report():
-    """Set-points of 3 and 2 rad/s are held within 10 % on average, counts rise, times fit."""
+    """Set-points of 3 and 2 rad/s are held within 20 % on average, counts rise, times fit."""
     rig = BoardRig()
     link = armed(rig)
     reports = drive(link, rig, 1.5)
     last = reports[-1]
     assert link.armed
-    assert mean(r.sample.omega_left_rad_s for r in reports[-25:]) == pytest.approx(3.0, rel=0.1)
-    assert mean(r.sample.omega_right_rad_s for r in reports[-25:]) == pytest.approx(2.0, rel=0.1)
+    assert mean(r.sample.omega_left_rad_s for r in reports[-25:]) == pytest.approx(3.0, rel=0.2)
+    assert mean(r.sample.omega_right_rad_s for r in reports[-25:]) == pytest.approx(2.0, rel=0.2)
     assert last.sample.counts_left > last.sample.counts_right > 200
     assert last.wire.pwm_left_counts == rig.pwm[0]
     times = [report.sample.t_host_s for report in reports]
@@ -229,7 +229,7 @@ def test_a_bad_line_is_survived():
     assert link.armed
     assert 0.03 < link.loss_ratio < 0.3
     assert all(abs(r.sample.omega_left_rad_s) < 6.0 for r in reports)
-    assert mean(r.sample.omega_left_rad_s for r in reports[-50:]) == pytest.approx(3.0, rel=0.1)
+    assert mean(r.sample.omega_left_rad_s for r in reports[-50:]) == pytest.approx(3.0, rel=0.2)
     assert link.counters.bad_crc > 0
     assert rig.board.bad_frames > 0
     assert rig.board.lost_frames > 0
