@@ -81,17 +81,17 @@ def disturbance_value(
 ) -> float:
     """Return what a disturbance adds at a time and place."""
 
+def host_board(clock_ppm: float, clock_start_us: int, baud: float) -> object:
+    """Return the handle of a board that is the firmware core compiled for this machine."""
+
 class Kernel:
-    """Robot and board in lockstep; its clock counts whole microseconds from reset."""
+    """Robot and board in lockstep; its clock counts whole microseconds from reset.
+
+    `board` is the handle of a board: `host_board`, or `sim_twin._pil.Board.handle`.
+    """
 
     def __init__(
-        self,
-        params: PlantParams,
-        step_us: int,
-        counts_per_turn: int,
-        clock_ppm: float,
-        clock_start_us: int,
-        baud: float,
+        self, params: PlantParams, step_us: int, counts_per_turn: int, board: object
     ) -> None: ...
     def reset(self, x_m: float, y_m: float, theta_rad: float) -> None:
         """Put the robot at rest at a pose, switch the board on, set the clock to zero."""

@@ -34,18 +34,21 @@ def make_kernel(
     rng: Random,
     disturbances: Sequence[Disturbance] = (),
     faults: Sequence[Fault] = (),
+    board: object | None = None,
 ) -> _native.Kernel:
     """Return robot and board at rest at the origin, with every event of the scenario loaded.
 
-    `rng` draws what nobody sets: when the board was switched on, and the noise.
+    `rng` draws what nobody sets: when the board was switched on, and the noise. `board` is the
+    handle of another board than the firmware core compiled for this machine.
     """
+    clock_start_us = rng.randrange(2_000_000, 600_000_000)
+    if board is None:
+        board = _native.host_board(robot.board_clock_ppm, clock_start_us, float(baud))
     kernel = _native.Kernel(
         plant_params(robot),
         step_us=STEP_US,
         counts_per_turn=robot.encoder_counts_per_turn,
-        clock_ppm=robot.board_clock_ppm,
-        clock_start_us=rng.randrange(2_000_000, 600_000_000),
-        baud=float(baud),
+        board=board,
     )
     noise_seed = rng.getrandbits(32) << 32
     for item in disturbances:

@@ -82,18 +82,23 @@ class TwinStream:
 
 
 class Twin:
-    """One simulated rig; `maker` None gives drawn poses in place of images."""
+    """One simulated rig; `maker` None gives drawn poses in place of images.
+
+    `board` is the handle of another board than the firmware core compiled for this machine.
+    """
 
     stream: ByteStream
 
-    def __init__(self, setup: TwinSetup, maker: FrameMaker | None = None) -> None:
+    def __init__(
+        self, setup: TwinSetup, maker: FrameMaker | None = None, board: object | None = None
+    ) -> None:
         def rng(part: str) -> Random:
             return Random(f"{setup.seed} {part}")
 
         self._setup = setup
         self._maker = maker
         self._kernel = make_kernel(
-            setup.robot, setup.link.baud, rng("kernel"), setup.disturbances, setup.faults
+            setup.robot, setup.link.baud, rng("kernel"), setup.disturbances, setup.faults, board
         )
         self._kernel.reset(setup.start.x_m, setup.start.y_m, setup.start.theta_rad)
         self._down = Channel(setup.link, rng("link down"))

@@ -6,6 +6,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <cstring>
 #include <memory>
 #include <stdexcept>
 
@@ -110,10 +111,20 @@ nb::list kernel_sent(Kernel& k) {
   return out;
 }
 
+// A board is handed about as a capsule, so that it may come from another module (sim_twin._pil).
+using BoardPointer = std::shared_ptr<twin::BoardSide>;
+constexpr char kBoardHandle[] = "twin::BoardSide";
+
+nb::capsule host_board(double clock_ppm, std::uint32_t clock_start_us, double baud) {
+  const twin::HostBoardOptions options{clock_ppm, clock_start_us, 10e6 / baud};
+  return nb::capsule(new BoardPointer(std::make_shared<twin::HostBoard>(options)), kBoardHandle,
+                     [](void* p) noexcept { delete static_cast<BoardPointer*>(p); });
+}
+
 void make_kernel(Kernel* self, const PlantParams& params, std::int64_t step_us, int counts_per_turn,
-                 double clock_ppm, std::uint32_t clock_start_us, double baud) {
-  const twin::HostBoardOptions board{clock_ppm, clock_start_us, 10e6 / baud};
-  new (self) Kernel(params, {step_us, counts_per_turn}, std::make_unique<twin::HostBoard>(board));
+                 const nb::capsule& board) {
+  if (std::strcmp(board.name(), kBoardHandle) != 0) throw nb::type_error("not a board's handle");
+  new (self) Kernel(params, {step_us, counts_per_turn}, *static_cast<BoardPointer*>(board.data()));
 }
 
 void bind_kernel(nb::module_& m) {
@@ -140,9 +151,9 @@ void bind_kernel(nb::module_& m) {
            },
            "angle_rad"_a, "t0_us"_a, "h_us"_a, "dead_a"_a = false, "dead_b"_a = false,
            "swapped"_a = false);
+  m.def("host_board", &host_board, "clock_ppm"_a, "clock_start_us"_a, "baud"_a);
   nb::class_<Kernel>(m, "Kernel")
-      .def("__init__", &make_kernel, "params"_a, "step_us"_a, "counts_per_turn"_a, "clock_ppm"_a,
-           "clock_start_us"_a, "baud"_a)
+      .def("__init__", &make_kernel, "params"_a, "step_us"_a, "counts_per_turn"_a, "board"_a)
       .def("reset", &Kernel::reset, "x_m"_a, "y_m"_a, "theta_rad"_a)
       .def("add_disturbance",
            [](Kernel& k, int load, int shape, double amplitude, double start_s, double end_s,

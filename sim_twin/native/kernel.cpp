@@ -50,7 +50,7 @@ void Encoder::move(double angle_rad, double t0_us, double h_us, const FaultState
 }
 
 Kernel::Kernel(const PlantParams& params, const KernelOptions& options,
-               std::unique_ptr<BoardSide> board)
+               std::shared_ptr<BoardSide> board)
     : plant_(params),
       options_(options),
       board_(std::move(board)),

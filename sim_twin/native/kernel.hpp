@@ -46,7 +46,7 @@ struct KernelOptions {
 class Kernel {
  public:
   Kernel(const PlantParams& params, const KernelOptions& options,
-         std::unique_ptr<BoardSide> board);
+         std::shared_ptr<BoardSide> board);
 
   // Robot at rest at the pose, board powered up, time zero.
   void reset(double x_m, double y_m, double theta_rad);
@@ -82,7 +82,7 @@ class Kernel {
 
   Plant plant_;
   KernelOptions options_;
-  std::unique_ptr<BoardSide> board_;
+  std::shared_ptr<BoardSide> board_;
   Disturbances disturbances_;
   Faults faults_;
   FaultState fault_;
