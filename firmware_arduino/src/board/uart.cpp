@@ -1,0 +1,129 @@
+#include "uart.h"
+
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <util/atomic.h>
+
+#include "pins.h"
+
+namespace hil {
+namespace uart {
+namespace {
+
+// The receive ring holds what arrives during the longest pass of the main loop: at 57,600 baud a
+// tick of 4 ms lets 23 bytes in. The transmit ring only bridges two passes; the core has its own.
+constexpr uint8_t kReceiveSize = 128;
+constexpr uint8_t kTransmitSize = 64;
+
+struct Channel {
+  volatile uint8_t rx_head, rx_tail, tx_head, tx_tail;  // heads are written to, tails taken from
+  volatile uint8_t lost;                                // since last asked for
+  uint8_t rx[kReceiveSize];
+  uint8_t tx[kTransmitSize];
+};
+
+Channel g_channels[kPorts];
+uint16_t g_lost;
+
+inline void on_received(Channel& channel, uint8_t status, uint8_t byte) {
+  if (status & _BV(DOR0)) ++channel.lost;  // one before this was overrun; this one is good
+  const uint8_t head = channel.rx_head;
+  const uint8_t next = (head + 1) % kReceiveSize;
+  if ((status & _BV(FE0)) || next == channel.rx_tail) {
+    ++channel.lost;
+    return;
+  }
+  channel.rx[head] = byte;
+  channel.rx_head = next;
+}
+
+// Returns true when there is nothing left to send and the interrupt can rest.
+inline bool on_empty(Channel& channel, volatile uint8_t& data) {
+  const uint8_t tail = channel.tx_tail;
+  if (tail == channel.tx_head) return true;
+  data = channel.tx[tail];
+  channel.tx_tail = (tail + 1) % kTransmitSize;
+  return false;
+}
+
+constexpr uint16_t kDivider = (F_CPU / 4 / kBaud - 1) / 2;  // double speed, rounded
+constexpr uint8_t kEnable = _BV(RXCIE0) | _BV(RXEN0) | _BV(TXEN0);
+constexpr uint8_t kFrame8N1 = _BV(UCSZ01) | _BV(UCSZ00);
+
+}  // namespace
+
+void start() {
+  // A line with nothing plugged in must idle high, or noise would read as bytes.
+  PORTD |= _BV(pins::kBluetoothRx);
+  UCSR0A = UCSR1A = _BV(U2X0);
+  UBRR0 = UBRR1 = kDivider;
+  UCSR0C = UCSR1C = kFrame8N1;
+  UCSR0B = UCSR1B = kEnable;
+}
+
+uint8_t read(Port port, uint8_t* out, uint8_t max) {
+  Channel& channel = g_channels[port];
+  uint8_t tail = channel.rx_tail;
+  uint8_t n = 0;
+  for (const uint8_t head = channel.rx_head; n < max && tail != head; ++n) {
+    out[n] = channel.rx[tail];
+    tail = (tail + 1) % kReceiveSize;
+  }
+  channel.rx_tail = tail;
+  return n;
+}
+
+uint8_t room(Port port) {
+  const Channel& channel = g_channels[port];
+  return (channel.tx_tail - channel.tx_head - 1) % kTransmitSize;
+}
+
+void write(Port port, const uint8_t* data, uint8_t n) {
+  Channel& channel = g_channels[port];
+  uint8_t head = channel.tx_head;
+  for (uint8_t i = 0; i < n; ++i) {
+    channel.tx[head] = data[i];
+    head = (head + 1) % kTransmitSize;
+  }
+  channel.tx_head = head;
+  // Set by the main program only and cleared by the interrupt only: a clear between read and
+  // write of the register costs one idle interrupt and loses nothing.
+  if (port == kUsb) {
+    UCSR0B = kEnable | _BV(UDRIE0);
+  } else {
+    UCSR1B = kEnable | _BV(UDRIE1);
+  }
+}
+
+bool has_received() {
+  return g_channels[kUsb].rx_head != g_channels[kUsb].rx_tail ||
+         g_channels[kBluetooth].rx_head != g_channels[kBluetooth].rx_tail;
+}
+
+uint16_t lost() {
+  for (Channel& channel : g_channels) {
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+      g_lost += channel.lost;
+      channel.lost = 0;
+    }
+  }
+  return g_lost;
+}
+
+ISR(USART0_RX_vect) {
+  const uint8_t status = UCSR0A;  // before the data register, which moves the queue on
+  on_received(g_channels[kUsb], status, UDR0);
+}
+ISR(USART1_RX_vect) {
+  const uint8_t status = UCSR1A;
+  on_received(g_channels[kBluetooth], status, UDR1);
+}
+ISR(USART0_UDRE_vect) {
+  if (on_empty(g_channels[kUsb], UDR0)) UCSR0B = kEnable;
+}
+ISR(USART1_UDRE_vect) {
+  if (on_empty(g_channels[kBluetooth], UDR1)) UCSR1B = kEnable;
+}
+
+}  // namespace uart
+}  // namespace hil
