@@ -1,0 +1,197 @@
+"""Calibration boards: what they look like, where their corners are, and how they are found.
+
+A board lies on the floor face up: x right and y up along the print, z out of the paper, origin at
+the outer lower left corner of the pattern (marked on the printed sheet), metres. A ChArUco board
+is the default: parts of it are enough, and every corner is known by its number. A chessboard must
+be seen whole, and one with an even-even or odd-odd number of squares looks the same upside down.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.errors import BadInput
+from vision import cv_compat
+
+Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+Rect = tuple[float, float, float, float]  # x, y of the lower left corner, width, height, all m
+
+POINTS_MIN = 6
+
+
+@dataclass(frozen=True, slots=True)
+class BoardView:
+    """One sight of a board: (N, 3) board points in m and their (N, 2) pixels, row by row."""
+
+    name: str
+    board_m: Array
+    px: Array
+
+
+def inner_corners(columns: int, rows: int, square_m: float) -> Array:
+    """Return the inner corners, (N, 3), row by row from the top left, in m."""
+    x, y = np.meshgrid(np.arange(1, columns), np.arange(rows - 1, 0, -1))
+    grid = np.column_stack((x.ravel(), y.ravel(), np.zeros(x.size)))
+    return np.asarray(grid * square_m, dtype=np.float64)
+
+
+def _black_squares(columns: int, rows: int, square_m: float) -> list[Rect]:
+    """Return the squares of the checker, the one at the top left being black."""
+    a = square_m
+    return [
+        (i * a, (rows - 1 - j) * a, a, a)
+        for j in range(rows)
+        for i in range(columns)
+        if (i + j) % 2 == 0
+    ]
+
+
+@dataclass(frozen=True)
+class Chessboard:
+    """A plain chessboard of columns x rows squares (one more than inner corners each way)."""
+
+    columns: int
+    rows: int
+    square_m: float
+    detector: str = "sector"
+
+    @property
+    def one_way_up(self) -> bool:
+        """Whether the colours of the squares tell the board from itself turned by 180 degrees."""
+        return (self.columns + self.rows) % 2 == 1
+
+    def find(self, image: Image, name: str = "") -> BoardView | None:
+        """Return all inner corners, or None: a chessboard is found whole or not at all."""
+        corners = cv_compat.find_chessboard(image, self.columns - 1, self.rows - 1, self.detector)
+        if corners is None:
+            return None
+        grid = corners.reshape(self.rows - 1, self.columns - 1, 2)
+        if _mirrored(grid):
+            grid = grid[:, ::-1]
+        if self.one_way_up and not _black_between(image, grid[:2, :2]):
+            grid = grid[::-1, ::-1]
+        points = inner_corners(self.columns, self.rows, self.square_m)
+        return BoardView(name, points, grid.reshape(-1, 2))
+
+    def black(self) -> list[Rect]:
+        """Return the black squares."""
+        return _black_squares(self.columns, self.rows, self.square_m)
+
+
+def _mirrored(grid: Array) -> bool:
+    """Return whether columns and rows run counter-clockwise in the image (y down)."""
+    along, down = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
+    return bool(along[0] * down[1] - along[1] * down[0] < 0.0)
+
+
+def _black_between(image: Image, corners: Array) -> bool:
+    """Return whether the square within 2 x 2 corners is darker than its right-hand neighbour."""
+    level = cv_compat.grey(image)
+    centre = corners.mean(axis=(0, 1))
+    right = centre + corners[:, 1].mean(axis=0) - corners[:, 0].mean(axis=0)
+    (u, v), (u_right, v_right) = np.rint(centre).astype(int), np.rint(right).astype(int)
+    height, width = level.shape
+    u_right, v_right = np.clip(u_right, 0, width - 1), np.clip(v_right, 0, height - 1)
+    return bool(level[v, u] < level[v_right, u_right])
+
+
+@dataclass(frozen=True)
+class Charuco:
+    """A chessboard with a numbered tag in each white square."""
+
+    columns: int
+    rows: int
+    square_m: float
+    marker_m: float
+    dictionary: str = "DICT_4X4_250"
+
+    @cached_property
+    def _cv_board(self) -> cv_compat.CharucoBoard:
+        return cv_compat.charuco_board(
+            self.columns, self.rows, self.square_m, self.marker_m, self.dictionary
+        )
+
+    def find(self, image: Image, name: str = "") -> BoardView | None:
+        """Return the inner corners seen; None for fewer than 6, or all of them in one line."""
+        numbers, px = cv_compat.detect_charuco(self._cv_board, image)
+        points = inner_corners(self.columns, self.rows, self.square_m)[numbers]
+        if len(points) < POINTS_MIN or np.linalg.matrix_rank(points[1:, :2] - points[0, :2]) < 2:
+            return None
+        return BoardView(name, points, px)
+
+    def black(self) -> list[Rect]:
+        """Return the black squares and the black cells of every tag."""
+        rects = _black_squares(self.columns, self.rows, self.square_m)
+        white = [(i, j) for j in range(self.rows) for i in range(self.columns) if (i + j) % 2 == 1]
+        margin = 0.5 * (self.square_m - self.marker_m)
+        for number, (i, j) in enumerate(white):
+            corner = (i * self.square_m + margin, (self.rows - 1 - j) * self.square_m + margin)
+            rects += tag_cells(self.dictionary, number, corner, self.marker_m)
+        return rects
+
+
+def tag_cells(name: str, number: int, corner_m: tuple[float, float], side_m: float) -> list[Rect]:
+    """Return the black cells of one tag, runs along a row joined, its lower left corner given."""
+    bits = cv_compat.tag_bits(name, number)
+    cells = len(bits)
+    a = side_m / cells
+    rects: list[Rect] = []
+    for row, line in enumerate(bits):
+        edges = np.flatnonzero(np.diff(np.r_[0, line.astype(int), 0]))
+        for start, end in edges.reshape(-1, 2):
+            y = corner_m[1] + (cells - 1 - row) * a
+            rects.append((corner_m[0] + start * a, y, (end - start) * a, a))
+    return rects
+
+
+Board = Chessboard | Charuco
+
+
+def parse_board(text: str, detector: str = "sector") -> Board:
+    """Return the board that a description names.
+
+    `charuco:COLUMNSxROWS:SQUARE_MM:MARKER_MM[:DICTIONARY]` or `chess:COLUMNSxROWS:SQUARE_MM`, in
+    squares and not in inner corners. Raises BadInput.
+    """
+    kind, *rest = text.split(":")
+    try:
+        columns, rows = (int(n) for n in rest[0].lower().split("x"))
+        sizes_m = [float(size) * 1e-3 for size in rest[1:3]]
+        board: Board
+        if kind == "chess" and len(rest) == 2:
+            board = Chessboard(columns, rows, sizes_m[0], detector)
+        elif kind == "charuco" and len(rest) in {3, 4}:
+            board = Charuco(columns, rows, sizes_m[0], sizes_m[1], *rest[3:])
+        else:
+            raise ValueError
+    except (ValueError, IndexError):
+        raise BadInput(
+            f"board {text!r}: not understood; give charuco:COLUMNSxROWS:SQUARE_MM:MARKER_MM or"
+            " chess:COLUMNSxROWS:SQUARE_MM, for example charuco:8x6:30:22 (squares, not corners)"
+        ) from None
+    _check(board, text)
+    return board
+
+
+def _check(board: Board, text: str) -> None:
+    """Raise BadInput for a board that cannot be printed or found."""
+    columns, rows, square_m = board.columns, board.rows, board.square_m
+    if min(columns, rows) < 3 or max(columns, rows) > 60 or not 0.001 <= square_m <= 1.0:
+        raise BadInput(f"board {text!r}: limits are 3 to 60 squares each way of 1 to 1000 mm")
+    if isinstance(board, Chessboard):
+        return
+    if not 0.3 * square_m <= board.marker_m <= 0.95 * square_m:
+        raise BadInput(
+            f"board {text!r}: marker {board.marker_m * 1e3:g} mm on a square of"
+            f" {square_m * 1e3:g} mm; limit is 0.3 to 0.95 of the square"
+        )
+    held = cv_compat.dictionary_size(board.dictionary)
+    if columns * rows // 2 > held:
+        raise BadInput(
+            f"board {text!r}: {columns * rows // 2} tags wanted, {board.dictionary} holds {held}"
+        )
