@@ -37,7 +37,7 @@ class _Spec:
         self.unpack = message_class.unpacker.unpack
         self.make: Callable[[tuple[Any, ...]], Any] | None = None
         if hot:
-            record: Any = namedtuple("Hot", message_class.ordered_fieldnames)  # type: ignore[misc]
+            record: Any = namedtuple(message_class.msgname, message_class.ordered_fieldnames)  # type: ignore[misc]
             self.make = record._make
 
 
