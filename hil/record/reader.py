@@ -75,7 +75,9 @@ class RunRecord:
         if not self.pictures:
             return {}
         chosen = {"start": self.pictures[0]}
-        steps_m = np.hypot(np.diff(self.samples["est_x_m"]), np.diff(self.samples["est_y_m"]))
+        who = "true" if metrics.has_truth(self.samples) else "est"
+        x_m, y_m = self.samples[f"{who}_x_m"], self.samples[f"{who}_y_m"]
+        steps_m = np.hypot(np.diff(x_m), np.diff(y_m))
         way_m = np.cumsum(np.nan_to_num(steps_m))
         if way_m.size and len(self.pictures) > 2:
             half_s = float(self.samples["t_s"][1:][np.searchsorted(way_m, way_m[-1] / 2)])

@@ -159,7 +159,7 @@ class Recorder:
 
     def _write_figures(self, run: RunRecord) -> None:
         figures = run.figures()
-        verdicts = [dataclasses.asdict(item) for item in run.verdicts()]
+        verdicts = [verdict.to_json() for verdict in run.verdicts()]
         text = json.dumps(figures.to_json() | {"requirements": verdicts}, indent=1)
         replace_file(self.path / layout.FIGURES, text.encode() + b"\n")
 

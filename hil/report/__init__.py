@@ -1,0 +1,1 @@
+"""Comparison of recorded runs: text, JSON, and an HTML report that needs no network."""

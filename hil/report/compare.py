@@ -1,0 +1,257 @@
+"""Sets runs of one scenario side by side, and says plainly which did better in what.
+
+Runs are comparable when their task is the same: scenario name, start, reference and duration.
+Everything else that differs (seed, limits, robot, link) is named as a warning.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from hil.errors import BadInput
+from hil.metrics import BY_NAME, METRICS, Figures, Metric, Verdict
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from hil.record.reader import RunRecord
+
+_TASK_KEYS = ("name", "start", "reference", "duration_s")
+# What a law brings along; it is the subject of a comparison, not a condition of it.
+_OWN_KEYS = ("description", "requirements", "control.outer", "control.gain")
+# The figures that decide the summary, with the question that each one answers.
+HEADLINES = {
+    "delta1_worst_last_second_m": "accuracy",
+    "settling_20mm_s": "speed",
+    "ise_m2_s": "error integral",
+    "control_energy_m2_s3": "control effort",
+    "theta_dot_variation_rad_s": "command smoothness",
+    "pwm_variation_counts": "PWM chatter",
+}
+_EQUAL_RATIO = 1.05
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One run of a comparison, under the shortest label that tells it from the others."""
+
+    label: str
+    run: RunRecord
+    figures: Figures
+    verdicts: tuple[Verdict, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Say whether the run completed and met every requirement of its scenario."""
+        complete = self.run.manifest.outcome == "complete"
+        return complete and all(verdict.holds for verdict in self.verdicts)
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Runs of one scenario, and what a reader must know before trusting their differences."""
+
+    scenario_name: str
+    description: str
+    entries: tuple[Entry, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Say whether every run met every requirement."""
+        return all(entry.holds for entry in self.entries)
+
+
+def compare_runs(runs: Sequence[RunRecord]) -> Comparison:
+    """Return the comparison of two or more runs; raises BadInput when their tasks differ."""
+    if len(runs) < 2:
+        raise BadInput(f"compare: {len(runs)} run given, at least 2 are needed")
+    for run in runs[1:]:
+        _refuse_other_task(runs[0], run)
+    entries = tuple(
+        Entry(label, run, run.figures(), run.verdicts())
+        for label, run in zip(labels(runs), runs, strict=True)
+    )
+    first = runs[0].manifest
+    description = str(first.scenario.get("description", ""))
+    return Comparison(first.scenario_name, description, entries, tuple(_warnings(entries)))
+
+
+def _refuse_other_task(first: RunRecord, other: RunRecord) -> None:
+    for key in _TASK_KEYS:
+        here, there = first.manifest.scenario.get(key), other.manifest.scenario.get(key)
+        if here != there:
+            raise BadInput(
+                f"{other.path}: cannot be compared with {first.path}: scenario {key} differs "
+                f"({_short(there)} against {_short(here)}); compare runs of one scenario"
+            )
+
+
+def labels(runs: Sequence[RunRecord]) -> list[str]:
+    """Return a distinct label per run, made of as little as needed: law, inner law, seed, folder."""
+    makers: tuple[Callable[[RunRecord], str], ...] = (
+        lambda run: run.manifest.outer,
+        lambda run: f"{run.manifest.outer} over {run.manifest.inner}",
+        lambda run: f"{run.manifest.outer}, seed {run.manifest.seed}",
+        lambda run: f"{run.manifest.outer}, {run.path.name}",
+    )
+    for make in makers:
+        names = [make(run) for run in runs]
+        if len(set(names)) == len(names):
+            return names
+    return [f"{run.manifest.outer}, run {index + 1}" for index, run in enumerate(runs)]
+
+
+def _warnings(entries: Sequence[Entry]) -> list[str]:
+    """Return one line for each condition in which the runs differ, and each flaw of a record."""
+    lines = [f"{entry.label}: {text}" for entry in entries for text in _flaws(entry)]
+    first = entries[0].run.manifest
+    for entry in entries[1:]:
+        other = entry.run.manifest
+        for key in ("seed", "target", "camera", "inner", "git_revision"):
+            here, there = getattr(first, key), getattr(other, key)
+            if here != there:
+                name = key.replace("_", " ")
+                lines.append(f"{entry.label}: {name} {there} against {here} ({entries[0].label})")
+        for key, here, there in differences(first.scenario, other.scenario):
+            text = f"{key} {_short(there)} against {_short(here)} ({entries[0].label})"
+            lines.append(f"{entry.label}: {text}")
+    bases = {entry.figures.basis for entry in entries}
+    if len(bases) > 1:
+        lines.append("figures rest on the truth in some runs and on the estimate in others")
+    return lines
+
+
+def _flaws(entry: Entry) -> list[str]:
+    manifest = entry.run.manifest
+    flaws = list(entry.run.problems)
+    if manifest.outcome in {"fault", "interrupted"}:
+        detail = f" ({manifest.outcome_detail})" if manifest.outcome_detail else ""
+        flaws.append(f"the run ended by {manifest.outcome}{detail}: figures cover what there is")
+    return flaws
+
+
+def differences(
+    here: Mapping[str, Any], there: Mapping[str, Any], prefix: str = ""
+) -> list[tuple[str, Any, Any]]:
+    """Return (dotted key, value here, value there) for each condition that differs."""
+    found: list[tuple[str, Any, Any]] = []
+    for key in dict.fromkeys([*here, *there]):
+        name = f"{prefix}{key}"
+        if name.startswith(_OWN_KEYS) or here.get(key) == there.get(key):
+            continue
+        one, two = here.get(key), there.get(key)
+        if isinstance(one, Mapping) and isinstance(two, Mapping):
+            found += differences(one, two, f"{name}.")
+        else:
+            found.append((name, one, two))
+    return found
+
+
+def _short(value: Any) -> str:
+    text = str(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def better_of(metric: Metric, values: Sequence[float]) -> int | None:
+    """Return the index of the best value; None without a direction, a rival, or a clear gap.
+
+    A settling time that does not exist means "never settled" and loses against any that does.
+    """
+    never = math.inf if metric.name.startswith("settling") else math.nan
+    ranked = [never if math.isnan(value) else value for value in values]
+    sign = -1.0 if metric.better == "higher" else 1.0
+    order = sorted((sign * value, i) for i, value in enumerate(ranked) if not math.isnan(value))
+    if metric.better == "neither" or len(order) < 2 or order[0][0] == order[1][0]:
+        return None
+    low, high = sorted(abs(ranked[order[k][1]]) for k in (0, 1))
+    return order[0][1] if low == 0.0 or high / low >= _EQUAL_RATIO else None
+
+
+def findings(comparison: Comparison) -> list[str]:
+    """Return plain sentences: who is better in each headline figure, by how much, how sure."""
+    if any(not math.isfinite(entry.figures.values["ise_m2_s"]) for entry in comparison.entries):
+        return ["An error is not finite in at least one run: nothing can be concluded."]
+    lines, wins = [], dict.fromkeys((entry.label for entry in comparison.entries), 0)
+    for name, topic in HEADLINES.items():
+        metric = BY_NAME[name]
+        values = [entry.figures.values[name] for entry in comparison.entries]
+        told = ", ".join(
+            f"{entry.label} {metric.text(value)}"
+            for entry, value in zip(comparison.entries, values, strict=True)
+        )
+        index = better_of(metric, values)
+        if index is None:
+            verdict = "no clear difference"
+        else:
+            winner = comparison.entries[index].label
+            wins[winner] += 1
+            verdict = f"{winner} is better{_factor(metric, values, index)}"
+        lines.append(f"{topic[0].upper()}{topic[1:]} ({metric.label}): {told}; {verdict}.")
+    score = ", ".join(f"{label} in {count}" for label, count in wins.items())
+    equal = len(HEADLINES) - sum(wins.values())
+    lines.append(
+        f"Better of {len(HEADLINES)} headline figures: {score}, no clear difference in {equal}. "
+        "One run each, so these differences carry no interval: repeats are needed to be sure."
+    )
+    return lines
+
+
+def _factor(metric: Metric, values: Sequence[float], index: int) -> str:
+    """Return " by a factor of ..." between the best value and the next one."""
+    rivals = [v for i, v in enumerate(values) if i != index and math.isfinite(v)]
+    best = values[index]
+    nearest = min(rivals) if metric.better == "lower" else max(rivals)
+    low, high = sorted((best, nearest))
+    return f" by a factor of {high / low:.2g}" if low > 0 else ""
+
+
+def to_json(comparison: Comparison) -> dict[str, Any]:
+    """Return the comparison as one JSON document."""
+    return {
+        "scenario": comparison.scenario_name,
+        "warnings": list(comparison.warnings),
+        "findings": findings(comparison),
+        "requirements_hold": comparison.holds,
+        "runs": [
+            {
+                "label": entry.label,
+                "path": str(entry.run.path),
+                "outer": entry.run.manifest.outer,
+                "inner": entry.run.manifest.inner,
+                "seed": entry.run.manifest.seed,
+                "outcome": entry.run.manifest.outcome,
+                **entry.figures.to_json(),
+                "requirements": [verdict.to_json() for verdict in entry.verdicts],
+            }
+            for entry in comparison.entries
+        ],
+    }
+
+
+def text_table(comparison: Comparison) -> Table:
+    """Return the figures side by side for a terminal, the better value of each row in bold."""
+    from rich.table import Table  # noqa: PLC0415 - terminals only; the report does without
+
+    basis = " and ".join(sorted({entry.figures.basis for entry in comparison.entries}))
+    table = Table(
+        title=f"{comparison.scenario_name}, errors from the {basis}", title_justify="left"
+    )
+    table.add_column("figure")
+    for entry in comparison.entries:
+        table.add_column(entry.label, justify="right")
+    table.add_column("unit")
+    for metric in METRICS:
+        values = [entry.figures.values[metric.name] for entry in comparison.entries]
+        best = better_of(metric, values)
+        cells = [metric.text(value, with_unit=False) for value in values]
+        if best is not None:
+            cells[best] = f"[bold green]{cells[best]}[/]"
+        table.add_row(metric.label, *cells, metric.shown_unit)
+    table.add_section()
+    marks = ["[green]pass[/]" if entry.holds else "[red]fail[/]" for entry in comparison.entries]
+    table.add_row("requirements", *marks, "")
+    return table

@@ -1,0 +1,364 @@
+"""The HTML report: one file, no network, figures as inline SVG, pictures as data."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import jinja2
+from markupsafe import Markup
+
+from hil.errors import BadInput
+from hil.metrics import BY_NAME, METRICS
+from hil.record.manifest import replace_file
+from hil.report import figures as draw
+from hil.report.assumptions import Assumption, assumptions
+from hil.report.compare import HEADLINES, Comparison, Entry, better_of, findings
+
+if TYPE_CHECKING:
+    from hil.report.circle import CircleStudy
+
+# Where the thesis shows the same of its experiments: path, error, control, photographs.
+_THESIS = {
+    "scenario-1": ("8.10", "8.11", "8.12", "8.13"),
+    "scenario-2": ("8.14", "8.15", "8.16", "8.17"),
+    "scenario-3": ("8.18", "8.19", "8.20", ""),
+}
+_PICTURE_WIDTH_PX = 400
+_JPEG_QUALITY = 72
+
+Context = dict[str, Any]
+
+
+def write_report(
+    path: Path,
+    comparisons: Sequence[Comparison],
+    *,
+    command: str,
+    title: str = "",
+    circle: CircleStudy | None = None,
+) -> None:
+    """Write the report of one or several comparisons to `path`, atomically.
+
+    `command` is the command line that made it; `circle` adds the section on ideal sensing.
+    Raises BadInput when `path` cannot be written.
+    """
+    page = render(comparisons, command=command, title=title, circle=circle).encode()
+    try:
+        replace_file(path, page)
+    except OSError as error:
+        raise BadInput(f"report {path}: cannot be written: {error.strerror}") from None
+
+
+def render(
+    comparisons: Sequence[Comparison],
+    *,
+    command: str,
+    title: str = "",
+    circle: CircleStudy | None = None,
+) -> str:
+    """Return the report as HTML text."""
+    template = (files("hil.report") / "report.html.j2").read_text(encoding="utf-8")
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    context = {
+        "title": title or _title(comparisons),
+        "subtitle": _subtitle(comparisons),
+        "verdict": _verdict(comparisons),
+        "basis_note": _basis_note(comparisons),
+        "summary": _summary(comparisons),
+        "parts": [_part(comparison) for comparison in comparisons],
+        "circle": _circle(circle) if circle is not None else None,
+        "conditions": _conditions(comparisons),
+        "command": command,
+        "provenance": _provenance(comparisons),
+        "records": [_record(entry) for item in comparisons for entry in item.entries],
+    }
+    return environment.from_string(template).render(context)
+
+
+def _entries(comparisons: Sequence[Comparison]) -> list[Entry]:
+    return [entry for comparison in comparisons for entry in comparison.entries]
+
+
+def _title(comparisons: Sequence[Comparison]) -> str:
+    laws = list(dict.fromkeys(entry.run.manifest.outer for entry in _entries(comparisons)))
+    names = ", ".join(comparison.scenario_name for comparison in comparisons)
+    return f"{' and '.join(laws)}: {names}"
+
+
+def _subtitle(comparisons: Sequence[Comparison]) -> str:
+    first = comparisons[0].entries[0].run.manifest
+    runs = len(_entries(comparisons))
+    started = first.start_time_utc.replace("T", " ")[:16]
+    return f"{runs} runs on target {first.target}, camera {first.camera}, {started} UTC"
+
+
+def _verdict(comparisons: Sequence[Comparison]) -> str:
+    entries = _entries(comparisons)
+    good = sum(entry.holds for entry in entries)
+    if good == len(entries):
+        return f"All {good} runs completed and met every requirement of their scenario."
+    bad = ", ".join(
+        f"{comparison.scenario_name} {entry.label}"
+        for comparison in comparisons
+        for entry in comparison.entries
+        if not entry.holds
+    )
+    return f"{len(entries) - good} of {len(entries)} runs did not meet every requirement: {bad}."
+
+
+def _basis_note(comparisons: Sequence[Comparison]) -> str:
+    bases = {entry.figures.basis for entry in _entries(comparisons)}
+    told = {
+        "truth": "Errors and paths rest on the simulated robot's true state.",
+        "estimate": "Errors and paths rest on the estimated state: the truth is not known here.",
+    }
+    return " ".join(told[basis] for basis in sorted(bases))
+
+
+def _colours(comparison: Comparison) -> list[int]:
+    return [trace.colour for trace in draw.traces(comparison.entries)]
+
+
+def _cells(comparison: Comparison, name: str) -> list[Context]:
+    metric = BY_NAME[name]
+    values = [entry.figures.values[name] for entry in comparison.entries]
+    best = better_of(metric, values)
+    return [
+        {"text": metric.text(value, with_unit=False), "best": index == best}
+        for index, value in enumerate(values)
+    ]
+
+
+def _summary(comparisons: Sequence[Comparison]) -> Context:
+    rows = []
+    for comparison in comparisons:
+        columns = [_cells(comparison, name) for name in HEADLINES]
+        colours = _colours(comparison)
+        for index, entry in enumerate(comparison.entries):
+            rows.append(
+                {
+                    "new": index == 0,
+                    "scenario": comparison.scenario_name if index == 0 else "",
+                    "label": entry.label,
+                    "colour": colours[index],
+                    "holds": entry.holds,
+                    "cells": [column[index] for column in columns],
+                }
+            )
+    heads = [(BY_NAME[name].label, BY_NAME[name].shown_unit) for name in HEADLINES]
+    return {"heads": heads, "rows": rows}
+
+
+def _part(comparison: Comparison) -> Context:
+    """Return the section of one scenario."""
+    colours = _colours(comparison)
+    runs = [
+        {"label": entry.label, "colour": colour, "outcome": entry.run.manifest.outcome}
+        for entry, colour in zip(comparison.entries, colours, strict=True)
+    ]
+    photographs = _THESIS.get(comparison.scenario_name, ("",) * 4)[3]
+    return {
+        "anchor": _anchor(comparison.scenario_name),
+        "name": comparison.scenario_name,
+        "description": comparison.description,
+        "warnings": comparison.warnings,
+        "figures": _figures(comparison),
+        "photos": _photos(comparison, colours),
+        "photo_title": f"Photographs{_after(photographs)}",
+        "runs": runs,
+        "rows": [
+            {
+                "label": metric.label,
+                "cells": _cells(comparison, metric.name),
+                "unit": metric.shown_unit,
+                "definition": metric.definition,
+            }
+            for metric in METRICS
+        ],
+        "requirements": _requirements(comparison),
+        "findings": findings(comparison),
+    }
+
+
+def _anchor(name: str) -> str:
+    return re.sub(r"[^\w-]+", "-", name)
+
+
+def _after(number: str) -> str:
+    return f" (thesis figure {number})" if number else ""
+
+
+def _figures(comparison: Comparison) -> list[Context]:
+    runs = draw.traces(comparison.entries)
+    anchor = _anchor(comparison.scenario_name)
+    path, error, control, _ = _THESIS.get(comparison.scenario_name, ("",) * 4)
+    limits = [
+        verdict.maximum
+        for verdict in comparison.entries[0].verdicts
+        if verdict.name == "delta1_worst_last_second_m"
+    ]
+    limit_m = limits[0] if limits else None
+    drawn = [
+        (draw.path_figure(runs, f"{anchor}-path"), f"Path on the floor{_after(path)}",
+         "Centre of mass in the X-Y plane, seen from above; a dot ends each path, the arrow is "
+         "10 cm along the heading at the start."),
+        (draw.error_figure(runs, f"{anchor}-error", limit_m), f"Error per component{_after(error)}",
+         "|z1 - z1*|, logarithmic; the dotted line is the limit that the scenario sets on |δ1| "
+         "over the last second."),
+        (draw.control_figure(runs, f"{anchor}-control"), f"Control u{_after(control)}",
+         "The inputs of the compensated model (2.33): u1 = ζ = dη1/dt, u2 = dη2/dt."),
+        (draw.sliding_figure(runs, f"{anchor}-sliding"), "Sliding variable",
+         "Norm of s (8.17) and its boundary layer."),
+        (draw.wheel_figure(runs, f"{anchor}-wheels"), "Wheel speeds",
+         "Measured by the board (thin) over the set-points (wide and faint)."),
+    ]  # fmt: skip
+    return [
+        {"svg": Markup(svg), "title": title, "caption": caption}
+        for svg, title, caption in drawn
+        if svg is not None
+    ]
+
+
+def _photos(comparison: Comparison, colours: Sequence[int]) -> list[Context]:
+    strips = []
+    for entry, colour in zip(comparison.entries, colours, strict=True):
+        moments = entry.run.moments()
+        photos = [
+            {"moment": moment, "time": f"{picture.t_s:.1f}", "uri": _data_uri(picture.path)}
+            for moment, picture in moments.items()
+        ]
+        if photos:
+            strips.append({"label": entry.label, "colour": colour, "photos": photos})
+    return strips
+
+
+def _data_uri(path: Path) -> str:
+    """Return a picture, made small, as a data URI; a file that is no picture becomes empty."""
+    image = cv2.imread(str(path))
+    if image is None:
+        return ""
+    height = round(image.shape[0] * _PICTURE_WIDTH_PX / image.shape[1])
+    small = cv2.resize(image, (_PICTURE_WIDTH_PX, height), interpolation=cv2.INTER_AREA)
+    _, jpeg = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+    return f"data:image/jpeg;base64,{base64.b64encode(jpeg.tobytes()).decode()}"
+
+
+def _requirements(comparison: Comparison) -> list[Context]:
+    """Return one row per requirement; all runs have the same ones, their scenario being one."""
+    return [
+        {
+            "text": verdict.text(),
+            "cells": [
+                {"value": BY_NAME[own.name].text(own.value), "holds": own.holds}
+                for own in (entry.verdicts[index] for entry in comparison.entries)
+            ],
+        }
+        for index, verdict in enumerate(comparison.entries[0].verdicts)
+    ]
+
+
+def _circle(circle: CircleStudy) -> Context:
+    svg = draw.circle_figures(circle)
+    told = (
+        ("tracking", "Tracking of z1* (thesis figure 8.2)", "Both components of the flat output."),
+        ("error", "Tracking error (thesis figure 8.3)", "Square of |δ1| and its integral."),
+        ("control", "Control (thesis figure 8.4)", "Square of |u|, u = (ζ, u2), and its integral."),
+        ("sliding", "Sliding variable", "Norm of s from the first instant, and its layer."),
+    )
+    return {
+        "disturbance": circle.disturbance,
+        "findings": circle.findings(),
+        "figures": [
+            {"svg": Markup(svg[key]), "title": title, "caption": caption}
+            for key, title, caption in told
+        ],
+    }
+
+
+def _conditions(comparisons: Sequence[Comparison]) -> list[Context]:
+    """Return the values that all scenarios share, then what is each one's own, then the gains."""
+    tables = [
+        {
+            item.key: (group, item)
+            for group, items in assumptions(comparison_tree(comparison))
+            for item in items
+        }
+        for comparison in comparisons
+    ]
+    shared = {
+        key
+        for key, (_, item) in tables[0].items()
+        if all(key in table and table[key][1].value == item.value for table in tables)
+    }
+    blocks = [{"name": "All runs", "groups": _grouped(tables[0], shared)}] if shared else []
+    for comparison, table in zip(comparisons, tables, strict=True):
+        own = set(table) - shared
+        if own:
+            groups = _grouped(table, own)
+            blocks.append({"name": comparison.scenario_name, "groups": groups})
+    blocks.append({"name": "Gains", "groups": _gains(comparisons)})
+    return blocks
+
+
+def comparison_tree(comparison: Comparison) -> dict[str, Any]:
+    """Return the resolved scenario of a comparison: that of its first run."""
+    return comparison.entries[0].run.manifest.scenario
+
+
+def _grouped(
+    table: dict[str, tuple[str, Assumption]], keys: set[str]
+) -> list[tuple[str, list[Assumption]]]:
+    groups: dict[str, list[Assumption]] = {}
+    for key, (group, item) in table.items():
+        if key in keys:
+            groups.setdefault(group, []).append(item)
+    return list(groups.items())
+
+
+def _gains(comparisons: Sequence[Comparison]) -> list[tuple[str, list[Assumption]]]:
+    """Return the gains that each law ran with, as the manifests have them."""
+    groups: dict[str, list[Assumption]] = {}
+    for entry in _entries(comparisons):
+        manifest = entry.run.manifest
+        origin = f"set {manifest.gains.get('set', 'unnamed')}"
+        for key, value in manifest.gains.items():
+            if isinstance(value, dict):
+                name = manifest.outer if key == "outer" else key
+                groups.setdefault(
+                    f"{name}, {origin}",
+                    [Assumption(k, f"{v:g}" if isinstance(v, float) else str(v), "", "", origin)
+                     for k, v in value.items()],
+                )  # fmt: skip
+    return list(groups.items())
+
+
+def _provenance(comparisons: Sequence[Comparison]) -> list[tuple[str, str]]:
+    """Return what made the runs; a value that differs between them is listed as it differs."""
+    manifests = [entry.run.manifest for entry in _entries(comparisons)]
+    rows = []
+    for key in ("git_revision", "dialect_hash", "parameter_hash", "firmware_build_id"):
+        found = dict.fromkeys(str(getattr(manifest, key)) or "unknown" for manifest in manifests)
+        rows.append((key.replace("_", " "), ", ".join(found)))
+    versions = manifests[0].versions
+    rows += [(name, text) for name, text in versions.items()]
+    return rows
+
+
+def _record(entry: Entry) -> Context:
+    manifest = entry.run.manifest
+    samples = manifest.files.get("samples.parquet")
+    return {
+        "name": f"{manifest.scenario_name} {entry.label}",
+        "folder": str(entry.run.path),
+        "seed": manifest.seed,
+        "started": manifest.start_time_utc,
+        "digest": f"{samples.sha256[:16]}…" if samples else "record not closed",
+    }
