@@ -213,7 +213,7 @@ void bind_differentiator(nb::module_& m) {
       .value("IMPLICIT", hil::Scheme::IMPLICIT);
   nb::class_<SuperTwisting>(m, "SuperTwisting")
       .def(nb::init<float, float, float, hil::Scheme, float, std::optional<float>, float, float>(),
-           "l"_a, "l0"_a = 1.1f, "l1"_a = 1.5f, "scheme"_a = hil::Scheme::IMPLICIT, "cell"_a = 0.0f,
+           "l"_a, "l0"_a = 1.1f, "l1"_a = 1.5f, "scheme"_a = hil::Scheme::SEMI_IMPLICIT, "cell"_a = 0.0f,
            "l_min"_a = nb::none(), "rho_1_s"_a = 30.0f, "alpha"_a = 0.6f)
       .def("step", &SuperTwisting::step, "x"_a, "dt_s"_a)
       .def_prop_ro("l", &SuperTwisting::l);
@@ -231,7 +231,7 @@ void bind_encoder(nb::module_& m) {
 void bind_wheel(nb::module_& m) {
   nb::class_<hil::Wheel>(m, "Wheel")
       .def_ro("omega_rad_s", &hil::Wheel::omega_rad_s)
-      .def_ro("setpoint_rad_s", &hil::Wheel::setpoint_rad_s)
+      .def_prop_ro("setpoint_rad_s", [](const hil::Wheel& w) { return w.demand.setpoint_rad_s; })
       .def_ro("error_rad_s", &hil::Wheel::error_rad_s)
       .def_ro("error_rate_rad_s2", &hil::Wheel::error_rate_rad_s2)
       .def_ro("duty", &hil::Wheel::duty)

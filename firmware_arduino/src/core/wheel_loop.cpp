@@ -30,14 +30,16 @@ bool may_integrate(const Wheel& w, float push) {
   return w.saturation == 0 || (w.saturation > 0) == (push > 0.0f);
 }
 
-float feedforward(const WheelTuning& t, float setpoint_rad_s) {
+Demand demand_of(const WheelTuning& t, float setpoint_rad_s) {
   const float coulomb = clamp(setpoint_rad_s * t.ff_inv_dead_s_rad, 1.0f);
-  return t.ff_duty_s_rad * setpoint_rad_s + t.ff_dead_duty * coulomb;
+  const float size = fabsf(setpoint_rad_s);
+  return {setpoint_rad_s, t.ff_duty_s_rad * setpoint_rad_s + t.ff_dead_duty * coulomb,
+          t.gamma0 + t.gamma1 * size, size <= t.hold_setpoint_rad_s};
 }
 
 // e and its filtered derivative; both forms of the law, PID and telemetry use them.
 void track_error(Wheel& w, const WheelTuning& t) {
-  w.error_rad_s = w.omega_rad_s - w.setpoint_rad_s;
+  w.error_rad_s = w.omega_rad_s - w.demand.setpoint_rad_s;
   if (w.start == Start::ANEW) w.error_lag_rad_s = w.error_rad_s;
   const float lead = w.error_rad_s - w.error_lag_rad_s;
   w.error_rate_rad_s2 = lead * t.inv_error_rate_tau_1_s;
@@ -75,16 +77,13 @@ float asg_ism(Wheel& w, const WheelTuning& t) {
   Sliding& sl = w.sliding;
   const bool derivative = t.form == Form::DERIVATIVE;
   const float xb = derivative ? w.error_rate_rad_s2 : w.error_rad_s;
-  if (w.start == Start::RUNNING && fabsf(w.setpoint_rad_s - w.step_base_rad_s) > t.step_rad_s) {
-    w.start = Start::STEPPED;
-  }
   if (w.start != Start::RUNNING) {
     restart_sliding(sl, t, xb, derivative ? w.error_rad_s : 0.0f);
-    w.step_base_rad_s = w.setpoint_rad_s;
+    w.step_base_rad_s = w.demand.setpoint_rad_s;
   }
   const float xa = derivative ? w.error_rad_s : sl.integral;
-  const float bound = t.gamma0 + t.gamma1 * fabsf(w.setpoint_rad_s) + t.gamma2 * fabsf(w.omega_rad_s);
-  const float push = sliding_control(sl, t, xb, xa, bound);
+  const float push =
+      sliding_control(sl, t, xb, xa, w.demand.bound + t.gamma2 * fabsf(w.omega_rad_s));
   sl.t_mu0_s += TICK_S;
   if (may_integrate(w, w.error_rad_s)) sl.integral += TICK_S * w.error_rad_s;
   if (may_integrate(w, xa)) sl.average += with_sign(t.sigma_tick, xa);
@@ -101,9 +100,16 @@ float pid(Wheel& w, const WheelTuning& t) {
   return out;
 }
 
+// A new set-point; far enough from where t last started it is a step.
+void take_setpoint(Wheel& w, const WheelTuning& t, float setpoint_rad_s) {
+  w.demand = demand_of(t, setpoint_rad_s);
+  const bool far = fabsf(setpoint_rad_s - w.step_base_rad_s) > t.step_rad_s;
+  if (far && w.start == Start::RUNNING && t.law == Law::ASG_ISM) w.start = Start::STEPPED;
+}
+
 // Offset that makes up for the integrals that have just begun anew.
-float transfer(const Wheel& w, float forward, float law) {
-  if (w.start == Start::RETUNED) return w.duty - forward - law;
+float transfer(const Wheel& w, float law) {
+  if (w.start == Start::RETUNED) return w.duty - w.demand.forward_duty - law;
   if (w.start == Start::STEPPED) return clamp(w.feedback_duty - law, 1.0f);
   return w.start == Start::ANEW ? 0.0f : w.bump_duty;
 }
@@ -167,20 +173,20 @@ void wheel_estimate(Wheel& w, const WheelTuning& t, int32_t counts) {
 }
 
 void wheel_control(Wheel& w, const WheelTuning& t, float setpoint_rad_s) {
-  w.setpoint_rad_s = setpoint_rad_s;
-  w.holding = fabsf(setpoint_rad_s) <= t.hold_setpoint_rad_s &&
-              fabsf(w.omega_rad_s) <= t.hold_omega_rad_s;
+  if (setpoint_rad_s != w.demand.setpoint_rad_s || w.start != Start::RUNNING) {
+    take_setpoint(w, t, setpoint_rad_s);
+  }
+  w.holding = w.demand.zero && fabsf(w.omega_rad_s) <= t.hold_omega_rad_s;
   if (w.holding) {
     wheel_off(w);
     return;
   }
   if (w.start == Start::RETUNED) w.pid_integral_rad = w.rate_duty = w.sliding.s = 0.0f;
   track_error(w, t);
-  const float forward = feedforward(t, setpoint_rad_s);
   const float law = t.law == Law::PID ? pid(w, t) : asg_ism(w, t);
-  w.bump_duty = transfer(w, forward, law);
+  w.bump_duty = transfer(w, law);
   w.feedback_duty = law + w.bump_duty;
-  w.duty = forward + w.feedback_duty;
+  w.duty = w.demand.forward_duty + w.feedback_duty;
   w.bump_duty *= t.bump_keep;
   w.start = Start::RUNNING;
 }

@@ -48,11 +48,19 @@ struct Sliding {
   float gain;      // k(t), duty (duty/s in the derivative form)
 };
 
+// What follows from the set-point alone; worked out when it changes, which is 30 times a second.
+struct Demand {
+  float setpoint_rad_s;
+  float forward_duty;  // feed-forward
+  float bound;         // gamma0 + gamma1 |omega*|, the part of F of (2.9) that the set-point fixes
+  bool zero;           // counts as zero
+};
+
 struct Wheel {
   int32_t last_counts;
   SuperTwisting st;
   float omega_rad_s;          // low-passed estimate
-  float setpoint_rad_s;
+  Demand demand;
   float step_base_rad_s;      // set-point at which t last restarted
   float error_rad_s;          // e = omega - omega*
   float error_lag_rad_s;      // low-passed e
@@ -72,8 +80,8 @@ struct Wheel {
 void wheel_init(Wheel& w, const WheelTuning& t, int32_t counts);
 // Speed from the counts of this tick. Float operations: 21 with the implicit scheme.
 void wheel_estimate(Wheel& w, const WheelTuning& t, int32_t counts);
-// Wanted duty for the set-point. Float operations, division and root as four: ASG-ISM 47 (while eps(t)
-// still falls 54), PID 23.
+// Wanted duty for the set-point. Float operations, division and root as four: ASG-ISM 38 (while eps(t)
+// still falls 46), PID 18; on a new set-point 8 more.
 void wheel_control(Wheel& w, const WheelTuning& t, float setpoint_rad_s);
 // Rounds to PWM counts, limits range and slew, notes saturation. Float operations: 4.
 void wheel_limit(Wheel& w, const WheelTuning& t);
