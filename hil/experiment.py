@@ -11,14 +11,19 @@ from pathlib import Path
 from queue import Empty
 from typing import TYPE_CHECKING
 
+from hil import ideal
 from hil.config.load import load_scenario
 from hil.errors import BadInput
-from hil.run import RunSpec
+from hil.report.circle import CircleStudy
+from hil.report.compare import compare_runs
+from hil.run import RunSpec, camera_for
 
 if TYPE_CHECKING:
     from multiprocessing.queues import Queue
 
     from hil.config.deck import Deck
+    from hil.record.reader import RunRecord
+    from hil.report.compare import Comparison
 
 Update = Callable[[str, float], None]
 _REPORT_PERIOD_S = 0.5
@@ -32,7 +37,7 @@ class Conditions:
     """What all runs of an experiment share; `repeats` runs of each take seeds from `seed` up."""
 
     target: str
-    camera: str
+    camera: str | None
     inner: str
     seed: int
     repeats: int
@@ -54,7 +59,7 @@ def deck_specs(deck: Deck, conditions: Conditions, folder: Path) -> list[RunSpec
                     RunSpec(
                         scenario=scenario,
                         target=conditions.target,
-                        camera=conditions.camera,
+                        camera=camera_for(scenario, conditions.target, conditions.camera),
                         outer=law,
                         inner=conditions.inner,
                         seed=seed,
@@ -122,3 +127,22 @@ def _work(spec: RunSpec) -> Path:
             _news.put((run_name(spec), t_s))
 
     return execute(spec, progress).path
+
+
+def compare_by_scenario(records: Sequence[RunRecord]) -> list[Comparison]:
+    """Return one comparison per scenario, in the order in which the scenarios first come."""
+    groups: dict[str, list[RunRecord]] = {}
+    for record in records:
+        groups.setdefault(record.manifest.scenario_name, []).append(record)
+    return [compare_runs(group) for group in groups.values()]
+
+
+def circle_study() -> CircleStudy:
+    """Return section 8.9 with both laws, disturbed and ideally sensed (a few seconds)."""
+    xi = ideal.Disturbances()
+    return CircleStudy.of(
+        {law: ideal.run_circle(law, xi) for law in ("pid", "asg-ism")},
+        ideal.CIRCLE_GAINS.asg_ism.eps_min_m_s2,
+        f"{xi.a1_m_s2:g} sin({xi.w1_rad_s:g} t) m/s² on the forward acceleration, "
+        f"{xi.a2_m_s2:g} sin({xi.w2_rad_s:g} t) m/s² on the lateral acceleration",
+    )

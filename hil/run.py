@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING
 
 from vision.marks import MarkLocaliser
 
-from hil import _firmware
 from hil.clocks import CameraClock
-from hil.errors import BadInput
 from hil.estimator import BelievedGeometry, make_estimator
 from hil.laws import make_outer_law
 from hil.metrics import LinkStats
@@ -21,7 +19,7 @@ from hil.record.recorder import Recorder
 from hil.record.timeline import Timeline
 from hil.references import make_reference
 from hil.session import Parts, Progress, Session
-from hil.targets import open_rig
+from hil.targets import SIMULATED, open_rig
 from hil.wire.identity import board_hashes
 from hil.wire.link import BoardLink
 
@@ -58,6 +56,11 @@ def exit_status(record: RunRecord) -> int:
     return 0 if all(verdict.holds for verdict in record.verdicts()) else 1
 
 
+def camera_for(scenario: Scenario, target: str, asked: str | None) -> str:
+    """Return the camera asked for, or the target's default one."""
+    return asked or (scenario.camera_source if target in SIMULATED else "0")
+
+
 def new_folder(stem: str) -> Path:
     """Return a folder in runs/ that does not exist yet, named after `stem` and the time."""
     stamp = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
@@ -90,22 +93,11 @@ def execute(spec: RunSpec, progress: Progress | None = None) -> RunRecord:
 
 
 def board_parameters(scenario: Scenario, inner: str) -> dict[str, float]:
-    """Return every board parameter: its default, or the scenario's value within its bounds."""
-    table = {entry.name: entry for entry in _firmware.parameter_table()}
-    values = {name: entry.default for name, entry in table.items()}
-    for name, value in scenario.board.items():
-        if name not in table:
-            raise BadInput(f"board.{name}: no such parameter; known: {', '.join(table)}")
-        entry = table[name]
-        if not entry.minimum <= value <= entry.maximum:
-            raise BadInput(
-                f"board.{name} = {value:g} {entry.unit}: allowed {entry.minimum:g} to "
-                f"{entry.maximum:g} {entry.unit}"
-            )
-        values[name] = value
-    values["ENC_COUNTS"] = float(scenario.robot.encoder_counts_per_turn)
-    values["LAW"] = INNER_LAWS[inner]
-    return values
+    """Return every board parameter as this run needs it."""
+    return scenario.board | {
+        "ENC_COUNTS": float(scenario.robot.encoder_counts_per_turn),
+        "LAW": INNER_LAWS[inner],
+    }
 
 
 def make_parts(spec: RunSpec, rig: Rig, recorder: Recorder) -> Parts:

@@ -18,8 +18,9 @@ target_option = click.option(
     help="twin, pil, or serial:DEV[@BAUD].",
 )  # fmt: skip
 camera_option = click.option(
-    "--camera", default="rendered", show_default=True, metavar="SOURCE",
-    help="rendered, pose (no pictures, drawn measurement errors), a camera INDEX or a video FILE.",
+    "--camera", metavar="SOURCE",
+    help="rendered, pose (no pictures, drawn measurement errors), a camera INDEX or a video FILE. "
+    "[default: as the scenario says on a simulated target, 0 on a real one]",
 )  # fmt: skip
 outer_option = click.option("--outer", type=LAWS, default="asg-ism", show_default=True,
                             help="Outer law, on the host.")  # fmt: skip

@@ -42,7 +42,7 @@ def command(
     target: str,
     outer: str,
     inner: str,
-    camera: str,
+    camera: str | None,
     seed: int,
     overrides: tuple[str, ...],
     out: Path | None,
@@ -56,13 +56,13 @@ def command(
     """
     from hil.config.load import load_scenario
     from hil.record.manifest import command_line
-    from hil.run import RunSpec, execute, exit_status, new_folder
+    from hil.run import RunSpec, camera_for, execute, exit_status, new_folder
 
     resolved = load_scenario(scenario, overrides)
     spec = RunSpec(
         scenario=resolved,
         target=target,
-        camera=camera,
+        camera=camera_for(resolved, target, camera),
         outer=outer,
         inner=inner,
         seed=seed,
@@ -77,7 +77,7 @@ def command(
     else:
         print_summary(record)
     if view:
-        from hil.cli.view import open_viewer
+        from hil.record.viewer import open_viewer
 
         open_viewer([record.path])
     return exit_status(record)

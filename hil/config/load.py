@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from hil._firmware import parameter_table
 from hil.config.scenario import Scenario
 from hil.errors import BadInput
 
@@ -51,13 +52,35 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
     names. Raises BadInput.
     """
     tree = read_tree(name_or_path, "scenarios")
+    tree["board"] = board_defaults() | tree.get("board", {})
     scenario = build(Scenario, tree, name_or_path)
-    if not overrides:
-        return scenario
-    full = scenario.model_dump(mode="json")
-    for text in overrides:
-        set_value(full, text)
-    return build(Scenario, full, "--set")
+    if overrides:
+        full = scenario.model_dump(mode="json")
+        for text in overrides:
+            set_value(full, text)
+        scenario = build(Scenario, full, "--set")
+    check_board(scenario.board)
+    return scenario
+
+
+def board_defaults() -> dict[str, float]:
+    """Return every parameter of the board with the default its firmware has."""
+    return {entry.name: entry.default for entry in parameter_table()}
+
+
+def check_board(values: Mapping[str, float]) -> None:
+    """Raise BadInput for a board parameter that does not exist or lies outside its bounds."""
+    table = {entry.name: entry for entry in parameter_table()}
+    for name, value in values.items():
+        entry = table.get(name)
+        if entry is None:
+            near = difflib.get_close_matches(name, table, n=3, cutoff=0.5) or list(table)
+            raise BadInput(f"board.{name}: no such parameter of the board; near: {', '.join(near)}")
+        if not entry.minimum <= value <= entry.maximum:
+            raise BadInput(
+                f"board.{name} = {value:g} {entry.unit}: allowed are {entry.minimum:g} to "
+                f"{entry.maximum:g} {entry.unit}".rstrip()
+            )
 
 
 def read_tree(name_or_path: str, kind: str) -> Tree:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field
 
 from hil.config.base import Section
@@ -55,6 +57,9 @@ class Scenario(Section):
     )
     board: dict[str, float] = Field(
         default_factory=dict, description="board parameters that differ from their defaults"
+    )
+    camera_source: Literal["rendered", "pose"] = Field(
+        "rendered", description="what a simulated target sees with unless --camera says otherwise"
     )
     camera: CameraConfig
     link: LinkConfig

@@ -1,0 +1,16 @@
+"""`hil view`: recorded runs in the Rerun viewer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command("view")
+@click.argument("runs", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RUN...")
+def command(runs: tuple[Path, ...]) -> None:
+    """Open one or several run records in the viewer, on a common timeline."""
+    from hil.record.viewer import open_viewer
+
+    open_viewer(list(runs))
