@@ -46,7 +46,9 @@ def open_source(text: str) -> FrameSource:
     if text.startswith(TWIN_PREFIX):
         return SocketSource(text.removeprefix(TWIN_PREFIX))
     if text.isdigit():
-        return CaptureSource(int(text))
+        from vision.sources import LiveCamera  # noqa: PLC0415 - most runs have no camera
+
+        return LiveCamera(int(text))
     if Path(text).is_file():
         return CaptureSource(text)
     raise BadInput(
@@ -55,7 +57,7 @@ def open_source(text: str) -> FrameSource:
     )
 
 
-class _Queue:
+class FrameQueue:
     """Frames from one thread to another, with a pipe that is readable while some are waiting."""
 
     def __init__(self) -> None:
@@ -67,14 +69,17 @@ class _Queue:
         self._lock = threading.Lock()
 
     def fileno(self) -> int:
+        """Return the end of the pipe to wait on."""
         return self._reader
 
     def put(self, frame: Frame) -> None:
+        """Add a frame; the oldest one makes room."""
         with self._lock:
             self._frames.append(frame)
             self._wake()
 
     def fail(self, reason: str) -> None:
+        """Let `poll` raise RigFault once the waiting frames are taken."""
         with self._lock:
             self._fault = reason
             self._wake()
@@ -85,6 +90,7 @@ class _Queue:
             os.write(self._writer, b".")
 
     def poll(self) -> Frame | None:
+        """Return the oldest frame waiting, None if none; raises RigFault after `fail`."""
         with self._lock:
             if self._frames:
                 frame = self._frames.popleft()
@@ -100,6 +106,7 @@ class _Queue:
             os.read(self._reader, 4096)
 
     def close(self) -> None:
+        """Close the pipe; safe to call twice."""
         with self._lock:
             for descriptor in (self._reader, self._writer):
                 if descriptor >= 0:
@@ -108,22 +115,17 @@ class _Queue:
 
 
 class CaptureSource:
-    """A camera or a video file through OpenCV; a file is played at its own rate.
+    """A video file through OpenCV, played at its own rate; `t_cam_s` is the container's stamp."""
 
-    `t_cam_s` is the driver's stamp where it gives one, else the arrival. What lies between the
-    middle of the exposure and that stamp is part of the calibrated latency.
-    """
+    def __init__(self, path: str) -> None:
+        import cv2  # noqa: PLC0415 - most runs have no camera and need not load the decoders
 
-    def __init__(self, device: int | str) -> None:
-        import cv2  # noqa: PLC0415 - most runs have no camera and need not load the drivers
-
-        self._name = f"camera {device}"
-        self._capture = cv2.VideoCapture(device)
+        self._name = f"camera {path}"
+        self._capture = cv2.VideoCapture(path)
         if not self._capture.isOpened():
-            raise RigFault(f"{self._name}: cannot be opened; `hil doctor` lists the cameras")
-        self._is_file = isinstance(device, str)
+            raise BadInput(f"{self._name}: not a video OpenCV can read")
         self._stamp_property = cv2.CAP_PROP_POS_MSEC
-        self._queue = _Queue()
+        self._queue = FrameQueue()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
         self._thread.start()
@@ -132,17 +134,12 @@ class CaptureSource:
         start_s = time.monotonic()
         index = 0
         while not self._stop.is_set():
-            stamp_ok, image = self._capture.read()
-            if not stamp_ok or image is None:
-                end = "end of file" if self._is_file else "gives no more frames; is it unplugged?"
-                self._queue.fail(f"{self._name}: {end} after {index} frames")
+            done, image = self._capture.read()
+            if not done or image is None:
+                self._queue.fail(f"{self._name}: end of file after {index} frames")
                 return
-            arrival_s = time.monotonic()
             stamp_s = self._capture.get(self._stamp_property) * 1e-3
-            if self._is_file:
-                self._stop.wait(start_s + stamp_s - arrival_s)
-            elif stamp_s <= 0.0:
-                stamp_s = arrival_s
+            self._stop.wait(start_s + stamp_s - time.monotonic())
             self._queue.put(Frame(index, stamp_s, np.asarray(image, np.uint8)))
             index += 1
 
@@ -151,7 +148,7 @@ class CaptureSource:
         return self._queue.fileno()
 
     def poll(self) -> Frame | None:
-        """Return the oldest frame waiting; raises RigFault when the camera is gone."""
+        """Return the oldest frame waiting; raises RigFault at the end of the file."""
         return self._queue.poll()
 
     def close(self) -> None:
@@ -204,7 +201,7 @@ class SocketSource:
             raise RigFault(
                 f"{self._name}: {error.strerror}; start `hil twin serve` first"
             ) from None
-        self._queue = _Queue()
+        self._queue = FrameQueue()
         self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
         self._thread.start()
 
