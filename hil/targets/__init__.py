@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from hil.config.scenario import Scenario
     from hil.targets.base import Rig
 
-SIMULATED = ("twin",)
+SIMULATED = ("twin", "pil")
 
 
 def open_rig(target: str, scenario: Scenario, camera: str, seed: int) -> Rig:
@@ -23,13 +23,17 @@ def open_rig(target: str, scenario: Scenario, camera: str, seed: int) -> Rig:
         from sim_twin.twin import Twin  # noqa: PLC0415
 
         return Twin(twin_setup(scenario, seed), frame_maker(scenario, camera, seed))
+    if target == "pil":
+        from sim_twin.pil import Pil  # noqa: PLC0415
+
+        return Pil(twin_setup(scenario, seed), frame_maker(scenario, camera, seed))
     if target.startswith("serial:"):
         from hil.targets.frames import open_source  # noqa: PLC0415
         from hil.targets.serial import SerialRig, parse_target  # noqa: PLC0415
 
         device, baud = parse_target(target)
         return SerialRig(device, baud, open_source(camera))
-    raise BadInput(f"target {target!r}: unknown; choose twin or serial:DEV[@BAUD]")
+    raise BadInput(f"target {target!r}: unknown; choose twin, pil or serial:DEV[@BAUD]")
 
 
 def true_robot(scenario: Scenario) -> RobotConfig:

@@ -309,7 +309,8 @@ std::string Chip::memory(std::uint32_t address, std::uint32_t size) const {
 std::string Chip::eeprom(std::uint32_t size) const {
   std::string out(size, '\0');
   avr_eeprom_desc_t part{reinterpret_cast<std::uint8_t*>(out.data()), 0, size};
-  if (avr_ioctl(avr_, AVR_IOCTL_EEPROM_GET, &part) != 0) throw std::out_of_range("not in EEPROM");
+  // simavr 1.6 says -1 for success here and -2 for a bad range.
+  if (avr_ioctl(avr_, AVR_IOCTL_EEPROM_GET, &part) == -2) throw std::out_of_range("not in EEPROM");
   return out;
 }
 
@@ -317,7 +318,7 @@ void Chip::set_eeprom(const std::string& bytes) {
   std::string copy = bytes;
   avr_eeprom_desc_t part{reinterpret_cast<std::uint8_t*>(copy.data()), 0,
                          static_cast<std::uint32_t>(copy.size())};
-  if (!copy.empty() && avr_ioctl(avr_, AVR_IOCTL_EEPROM_SET, &part) != 0) {
+  if (!copy.empty() && avr_ioctl(avr_, AVR_IOCTL_EEPROM_SET, &part) == -2) {
     throw std::out_of_range("not in EEPROM");
   }
 }

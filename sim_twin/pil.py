@@ -1,0 +1,57 @@
+"""Target `pil`: the twin with the firmware's ELF on a simulated ATmega2560 for a board.
+
+Robot, camera, and what lies behind the serial ports are the twin's; the line between port and
+processor is the processor's own UART at its own pace.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hil.errors import BadInput
+from hil.firmware import Build, build
+from sim_twin.twin import FrameMaker, Twin, TwinSetup
+
+if TYPE_CHECKING:
+    from sim_twin import _pil
+
+UART_BAUD = 57_600  # of both serial ports, firmware_arduino/src/board/uart.h
+PACKAGES = "libsimavr-dev libelf-dev"
+
+
+def pil_module() -> type[_pil.Board]:
+    """Return the simulated board's class; BadInput where the module was not built."""
+    try:
+        from sim_twin._pil import Board  # noqa: PLC0415 - optional, and only this target needs it
+    except ImportError as error:
+        raise BadInput(
+            f"target pil: sim_twin._pil cannot be loaded ({error}); Debian: apt install {PACKAGES}, "
+            "then set the project up again with .ci/setup"
+        ) from None
+    return Board
+
+
+class Pil(Twin):
+    """One simulated rig whose board is the firmware itself; `board` gives access to its insides.
+
+    `eeprom` is what the EEPROM holds at first power-up, the rest of it erased.
+    """
+
+    def __init__(
+        self,
+        setup: TwinSetup,
+        maker: FrameMaker | None = None,
+        *,
+        firmware: Path | None = None,
+        eeprom: bytes = b"",
+    ) -> None:
+        if setup.link.baud != UART_BAUD:
+            raise BadInput(
+                f"link.baud = {setup.link.baud} bit/s: the board's serial ports run at {UART_BAUD} "
+                "bit/s and target pil takes them as they are; leave link.baud at its default"
+            )
+        self.build: Build | None = None if firmware else build()
+        elf = firmware if self.build is None else self.build.elf
+        self.board = pil_module()(str(elf), "1", setup.robot.board_clock_ppm, eeprom)
+        super().__init__(setup, maker, self.board.handle())
