@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import re
 import select
 import time
 
@@ -58,21 +60,30 @@ class SerialStream:
         self.port.close()
 
 
+_REASONS = {
+    errno.ENOENT: "no such port; `hil doctor` lists the ports",
+    errno.EACCES: "no permission; add yourself to the group dialout and log in again",
+    errno.EPERM: "no permission; add yourself to the group dialout and log in again",
+    errno.EBUSY: "in use by another program; close it first",
+    errno.EAGAIN: "in use by another program; close it first",
+    errno.ENOTTY: "not a serial port; `hil doctor` lists the ports",
+    errno.EIO: "gone while in use; was it unplugged or switched off?",
+    errno.ENXIO: "gone while in use; was it unplugged or switched off?",
+}
+
+
 def _reason(error: Exception) -> str:
     """Return one line that says what is wrong with a port and what to try."""
-    text = " ".join(str(error).split())
-    number = getattr(error, "errno", None)
     if isinstance(error, serial.SerialTimeoutException):
         return "takes no bytes for 0.2 s; is the board powered and the link up?"
-    if number == 2 or "No such file" in text:
-        return "no such port; `hil doctor` lists the ports"
-    if number == 13:
-        return "no permission; add yourself to the group dialout and log in again"
-    if number in (11, 16) or "exclusively lock" in text:
-        return "in use by another program; close it first"
-    if number == 5 or "disconnected" in text or isinstance(error, TypeError):
-        return "gone while in use; was it unplugged or switched off?"
-    return text
+    text = " ".join(str(error).split())
+    number = getattr(error, "errno", None)
+    if number is None:  # pyserial often has it in the text only
+        found = re.search(r"(?:Errno |\()(\d+)", text)
+        number = int(found.group(1)) if found else None
+    if "disconnected" in text or isinstance(error, TypeError):
+        number = errno.EIO
+    return _REASONS.get(number, text) if number is not None else text
 
 
 class SerialRig:
