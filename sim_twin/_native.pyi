@@ -117,7 +117,7 @@ class Kernel:
     def advance(self, t_us: int) -> int:
         """Run to `t_us`, or to the end of the step in which the board sent; return the time.
 
-        Raises RuntimeError when the state is not finite any more.
+        Raises RuntimeError when the state diverges.
         """
     def receive(self, t_us: int, data: bytes) -> None:
         """Let bytes reach the board's UART, the last one at `t_us`; in time order."""

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 
 # No clock of a real rig starts at zero; whoever mixes up host, board and camera time shall notice.
 HOST_START_S = 1000.0
-# Poses handed to the renderer over one exposure: 0.6 mm apart at 0.5 m/s and 6 ms.
+# Poses handed to the renderer over one exposure, an odd number so that one is at its middle:
+# 0.75 mm apart at 0.5 m/s and 6 ms.
 POSES_PER_EXPOSURE = 5
 
 
@@ -109,7 +110,7 @@ class Twin:
         self._shutter = Shutter(setup.camera, rng("shutter"), HOST_START_S)
         self._now_s = HOST_START_S
         self._uplink: deque[tuple[float, bytes]] = deque()
-        self._exposed: deque[Exposure] = deque()
+        self._exposed: deque[tuple[Exposure, tuple[PoseTuple, ...]]] = deque()
         self._set_spans(math.inf)
         self._next_frame = self._shutter.next(self._stalls)
 
@@ -138,13 +139,10 @@ class Twin:
         """Return the oldest frame not yet taken; it is drawn only now."""
         if not self._exposed:
             return None
-        exposure = self._exposed.popleft()
-        middle_s = 0.5 * (exposure.start_s + exposure.end_s)
-        hidden = any(start_s <= middle_s < end_s for start_s, end_s in self._occlusions)
+        exposure, poses = self._exposed.popleft()
         if self._maker is None:
-            seen = None if hidden else self._pose_at(middle_s)
-            return Frame(exposure.index, exposure.t_cam_s, None, self._drawn.measure(seen))
-        poses = () if hidden else self._poses_over(exposure)
+            middle = poses[len(poses) // 2] if poses else None
+            return Frame(exposure.index, exposure.t_cam_s, None, self._drawn.measure(middle))
         return Frame(exposure.index, exposure.t_cam_s, self._maker.make(exposure.index, poses))
 
     def truth(self) -> Truth:
@@ -193,7 +191,7 @@ class Twin:
             self._arrived.append(self._uplink.popleft()[1])
             arrived = True
         while self._next_frame and self._next_frame.arrival_s <= self._now_s:
-            self._exposed.append(self._next_frame)
+            self._exposed.append((self._next_frame, self._poses_over(self._next_frame)))
             self._next_frame = self._shutter.next(self._stalls)
             arrived = True
         return arrived
@@ -203,6 +201,10 @@ class Twin:
         return self._kernel.pose_at(min(max(t_us, 0.0), self._kernel.time_us))
 
     def _poses_over(self, exposure: Exposure) -> tuple[PoseTuple, ...]:
+        """Return the robot's poses from start to end of the exposure; none while it is hidden."""
+        for start_s, end_s in self._occlusions:
+            if start_s <= exposure.start_s < end_s:
+                return ()
         step_s = (exposure.end_s - exposure.start_s) / (POSES_PER_EXPOSURE - 1)
         return tuple(
             self._pose_at(exposure.start_s + i * step_s) for i in range(POSES_PER_EXPOSURE)

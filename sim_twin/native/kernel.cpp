@@ -11,6 +11,7 @@ namespace {
 constexpr std::uint8_t kGray[4] = {0b00, 0b10, 0b11, 0b01};
 // A jam is a damper stiff enough to hold a stalled motor's torque below 0.1 rad/s.
 constexpr double kJam_n_m_s_rad = 12.0;
+constexpr double kRunaway_rad_s = 1e4;
 
 }  // namespace
 
@@ -135,6 +136,10 @@ void Kernel::step() {
   set_drive();
   integrate();
   const StateVector& x = plant_.state();
+  // Before the encoders, which would count every turn of a wheel that has run away; NaN fails too.
+  if (!(std::fabs(x[kOmegaL]) + std::fabs(x[kOmegaR]) < kRunaway_rad_s)) {
+    throw std::runtime_error("the simulated robot's state diverges");
+  }
   edges_.clear();
   for (int side = 0; side < 2; ++side) {
     encoders_[side].move(x[kWheelL + side], t0_us, h_us, fault_.side[side], side, edges_);
@@ -145,12 +150,7 @@ void Kernel::step() {
   time_us_ += options_.step_us;
   battery_v_ = plant_.battery_v(drive_, sag_v_);
   board_->advance_to(time_us_, battery_v_);
-  if (time_us_ % kPoseSpacing_us == 0) {
-    if (!std::isfinite(x[kX] + x[kEta1] + x[kThetaDot] + x[kCurrentL] + x[kCurrentR])) {
-      throw std::runtime_error("the simulated robot's state is not finite any more");
-    }
-    remember();
-  }
+  if (time_us_ % kPoseSpacing_us == 0) remember();
 }
 
 PoseSample Kernel::pose_at(double t_us) const {

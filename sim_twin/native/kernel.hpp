@@ -56,7 +56,7 @@ class Kernel {
   void begin(std::int64_t t_us) { begin_us_ = t_us; }
 
   // Run until t_us is reached, or to the end of the step in which the board has sent something.
-  // Returns the time reached. Throws when the state is no longer finite.
+  // Returns the time reached. Throws when the state diverges.
   std::int64_t advance(std::int64_t t_us);
   void receive(std::int64_t t_us, std::string bytes) { board_->receive(t_us, std::move(bytes)); }
   std::vector<Chunk> take_sent();
