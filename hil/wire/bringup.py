@@ -14,7 +14,7 @@ from hil.errors import RigFault
 from hil.targets.base import Rig
 from hil.wire import dialect, identity
 from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM
-from hil.wire.link import BoardLink, Procedure
+from hil.wire.link import BoardLink, Procedure, enum_name
 
 # Opening the port of an Arduino resets it; its boot loader holds it for up to 2 s.
 _FIRST_HEARTBEAT_S = 6.0
@@ -191,8 +191,7 @@ def _command(link: BoardLink, what: str, command: int, *params: float) -> Proced
     result = link.acks[command]
     if result != dialect.MAV_RESULT_ACCEPTED:
         why = yield from _explanation(link, start_s)
-        name = dialect.enums["MAV_RESULT"][result].name.removeprefix("MAV_RESULT_")
-        raise RigFault(f"board: refuses to {what} ({name}){why}")
+        raise RigFault(f"board: refuses to {what} ({enum_name('MAV_RESULT', result)}){why}")
 
 
 def _explanation(link: BoardLink, start_s: float) -> Generator[None, None, str]:

@@ -52,6 +52,12 @@ class WheelReport(NamedTuple):
     round_trip_s: float
 
 
+def enum_name(enum: str, value: int) -> str:
+    """Return the name of a value without the enum's own: ("HIL_STATE", 1) is "ARMED"."""
+    entry = dialect.enums[enum].get(value)
+    return str(entry.name.removeprefix(f"{enum}_")) if entry else str(value)
+
+
 class BoardLink:
     """Speaks to one board over a byte stream.
 
@@ -122,11 +128,10 @@ class BoardLink:
     @property
     def state_name(self) -> str:
         """State and reason in words: "ARMED", "SAFE (SETPOINT_TIMEOUT)"."""
-        state = dialect.enums["HIL_STATE"][self.state].name.removeprefix("HIL_STATE_")
+        state = enum_name("HIL_STATE", self.state)
         if self.reason == dialect.HIL_REASON_NONE:
-            return str(state)
-        reason = dialect.enums["HIL_REASON"][self.reason].name.removeprefix("HIL_REASON_")
-        return f"{state} ({reason})"
+            return state
+        return f"{state} ({enum_name('HIL_REASON', self.reason)})"
 
     def poll(self, t_host_s: float) -> Sequence[WheelReport]:
         """Take what has arrived by `t_host_s`, run what is due; return new wheel reports."""
