@@ -192,15 +192,19 @@ class Session:
     def _stop(self) -> None:
         """Stop the wheels: politely while the board answers, by repeated stop commands if not."""
         rig, link = self._parts.rig, self._parts.link
+        if not link.armed:
+            return
         try:
-            if link.armed:
-                self._send_wheels(0.0, 0.0)
-                link.begin(bringup.disarm(link))
-                self._pump_while(lambda: link.busy or link.armed, rig.now_s() + _STOP_TIMEOUT_S)
+            self._send_wheels(0.0, 0.0)
+            link.begin(bringup.disarm(link))
+            if self._pump_while(lambda: link.busy or link.armed, rig.now_s() + _STOP_TIMEOUT_S):
                 self._note("stopped", link.state_name)
+                return
+            reason = "no answer to the stop; the board's own time-out ends its motion"
         except (RigFault, KeyboardInterrupt) as error:
-            link.stop_now(rig.now_s())
-            self._note("stop", f"emergency stop sent: {error}")
+            reason = str(error) or "Ctrl-C"
+        link.stop_now(rig.now_s())
+        self._note("stop", f"emergency stop sent: {reason}")
 
     # -- events --------------------------------------------------------------------------------
 
