@@ -40,7 +40,7 @@ CIRCLE_LIMITS = OuterLimits(
     approach_speed_m_s=None,
     approach_accel_m_s2=None,
     lambda_m_s=1e-4,
-    wheel_lag_s=0,
+    lead_s=0,
 )
 # X, Y, theta, eta1, eta2: 50 mm off the circle's start in X and in Y, heading theta*(0) = 0, and
 # the circle's own speed and turn rate. The first sentence of that is control.md's, the rest follows.

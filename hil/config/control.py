@@ -46,8 +46,17 @@ class OuterLimits(Section):
     zeta_start_m_s2: float = Field(
         0.1, ge=0, le=5, description="m/s^2, start of zeta at standstill, where B is singular"
     )
-    wheel_lag_s: float = Field(
-        0.06, ge=0, le=0.5, description="s, wheel-loop lag that set-points lead by"
+    lead_s: float = Field(
+        0.03, ge=0, le=0.5, description="s, lead of set-points; half the wheel lag, as noise grows"
+    )
+    hold_enter_m: float = Field(
+        0.0025,
+        ge=0,
+        le=1,
+        description="m, arrived: rest within; estimate's noise is 0.5 mm; 0 = never",
+    )
+    hold_leave_m: float = Field(
+        0.006, gt=0, le=1, description="m, pushed away: start anew beyond; well above hold_enter_m"
     )
 
 
@@ -126,10 +135,13 @@ class EstimatorConfig(Section):
     """What the estimator assumes of robot, camera and wheel loop."""
 
     wheel_lag_s: float = Field(
-        0.06, gt=0, le=0.5, description="s, first-order lag of the wheel loop, for the prediction"
+        0.05, gt=0, le=0.5, description="s, first-order lag of the wheel loop, for the prediction"
     )
     sigma_accel_rad_s2: float = Field(
         6.0, gt=0, le=1e4, description="rad/s^2, wheel acceleration the lag model misses (1 sigma)"
+    )
+    sigma_short_rad_s15: float = Field(
+        0.5, gt=0, le=1e3, description="rad/s^1.5, random walk of the wheel loop's standing error"
     )
     sigma_scale: float = Field(
         0.15, gt=0, le=1, description="ratio, prior 1 sigma of the distance and turn scales"

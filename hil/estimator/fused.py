@@ -18,7 +18,6 @@ from hil.estimator.odometry import (
     CommandHistory,
     WheelSpeeds,
     counts_between,
-    predict,
 )
 from hil.types import Estimate, Pose, PoseMeasurement, WheelSample
 
@@ -50,7 +49,10 @@ class Fused:
         self._geometry = geometry
         self._filter = PoseFilter(config, geometry.d0_m)
         self._speeds = WheelSpeeds(
-            config.wheel_lag_s, config.sigma_accel_rad_s2, geometry.rad_per_count
+            config.wheel_lag_s,
+            config.sigma_accel_rad_s2,
+            config.sigma_short_rad_s15,
+            geometry.rad_per_count,
         )
         self._commands = CommandHistory()
         self._last: WheelSample | None = None
@@ -131,9 +133,7 @@ class Fused:
     def _ahead(self, t_s: float) -> tuple[float, float, float, float]:
         """Return wheel angles turned since the head and wheel speeds at t_s, by the lag model."""
         begin = self._t_head
-        pieces = self._commands.segments(begin, min(t_s, begin + _HORIZON_S))
-        left, right = self._speeds.omega
-        return predict(pieces, left, right, self._config.wheel_lag_s)
+        return self._speeds.ahead(self._commands.segments(begin, min(t_s, begin + _HORIZON_S)))
 
     def _advance(self, t_s: float) -> None:
         """Move the anchor to t_s over the increments, the last one cut there."""

@@ -10,6 +10,9 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
+# A piece of constant command: duration in s, left and right wheel speed in rad/s.
+Piece = tuple[float, float, float]
+
 
 @dataclass(frozen=True, slots=True)
 class BelievedGeometry:
@@ -61,9 +64,9 @@ class CommandHistory:
         while len(items) > 1 and items[1][0] <= t_s:
             items.popleft()
 
-    def segments(self, t0_s: float, t1_s: float) -> list[tuple[float, float, float]]:
-        """Return (duration, left, right) of the constant pieces between two times, in order."""
-        out: list[tuple[float, float, float]] = []
+    def segments(self, t0_s: float, t1_s: float) -> list[Piece]:
+        """Return the constant pieces between two times, in order."""
+        out: list[Piece] = []
         items = self._items
         last = len(items) - 1
         for index, (start, left, right) in enumerate(items):
@@ -77,57 +80,76 @@ class CommandHistory:
 class WheelSpeeds:
     """Both wheel speeds by a Kalman filter on the counts, with the wheel loop's lag as the model.
 
-    Per wheel the state is [angle, speed], speed_dot = (command - speed)/lag + noise; the wheels
-    share one covariance because they share times and noise. Quantisation enters as count^2/12.
+    Per wheel the state is [angle, speed, shortfall]: speed_dot = (command - shortfall - speed)/lag
+    + noise. The shortfall is what the wheel loop leaves standing (friction, a blocked wheel), a
+    random walk; without it a wheel that does not obey would be taken to turn. The wheels share one
+    covariance because they share times and noise. Quantisation enters as count^2/12.
     """
 
-    def __init__(self, lag_s: float, sigma_accel_rad_s2: float, rad_per_count: float) -> None:
-        self._lag = lag_s
-        self._q = sigma_accel_rad_s2 * sigma_accel_rad_s2
-        self._r = rad_per_count * rad_per_count / 12.0
-        self._offset = [0.0, 0.0]  # filtered angle minus counted angle, left and right
-        self.omega = [0.0, 0.0]
-        self._p00, self._p01, self._p11 = self._r, 0.0, 1.0
-
-    def step(
-        self, dt_s: float, turned: tuple[float, float], pieces: list[tuple[float, float, float]]
+    def __init__(
+        self, lag_s: float, sigma_accel_rad_s2: float, sigma_short_rad_s15: float, unit_rad: float
     ) -> None:
-        """Take the angles turned (rad, left and right) in dt_s under the commands `pieces`."""
-        expected = predict(pieces, self.omega[0], self.omega[1], self._lag)
-        decay = math.exp(-dt_s / self._lag)
-        reach = self._lag * (1.0 - decay)
-        q = self._q * dt_s * dt_s
-        p00 = self._p00 + reach * (2.0 * self._p01 + reach * self._p11) + 0.25 * q * dt_s * dt_s
-        p01 = decay * (self._p01 + reach * self._p11) + 0.5 * q * dt_s
-        p11 = decay * decay * self._p11 + q
-        gain = 1.0 / (p00 + self._r)
-        for side in (0, 1):
-            ahead = self._offset[side] + expected[side] - turned[side]
-            self._offset[side] = ahead * (1.0 - p00 * gain)
-            self.omega[side] = expected[2 + side] - p01 * gain * ahead
-        self._p00, self._p01, self._p11 = (
-            p00 * (1.0 - p00 * gain),
-            p01 * (1.0 - p00 * gain),
-            p11 - p01 * p01 * gain,
-        )
+        self._lag = lag_s
+        self._q_speed = sigma_accel_rad_s2 * sigma_accel_rad_s2
+        self._q_short = sigma_short_rad_s15 * sigma_short_rad_s15
+        self._r = unit_rad * unit_rad / 12.0
+        self.restart()
 
     def restart(self) -> None:
-        """Forget the speeds: the counter has jumped (board restarted)."""
-        self._offset = [0.0, 0.0]
-        self.omega = [0.0, 0.0]
-        self._p00, self._p01, self._p11 = self._r, 0.0, 1.0
+        """Forget what was learned: at the start, and when the counters have jumped."""
+        self._offset = [0.0, 0.0]  # filtered angle minus counted angle, left and right
+        self._omega = [0.0, 0.0]
+        self._short = [0.0, 0.0]
+        self._p = (self._r, 0.0, 0.0, 1.0, 0.0, 1.0)  # upper triangle, row by row
 
+    def ahead(self, pieces: list[Piece]) -> tuple[float, float, float, float]:
+        """Return angles turned under the commands `pieces` and final speeds (left, right each)."""
+        angle_left = angle_right = 0.0
+        left, right = self._omega
+        short_left, short_right = self._short
+        lag = self._lag
+        for duration, goal_left, goal_right in pieces:
+            fade = math.exp(-duration / lag)
+            reach = lag * (1.0 - fade)
+            to_left, to_right = goal_left - short_left, goal_right - short_right
+            angle_left += to_left * duration + (left - to_left) * reach
+            angle_right += to_right * duration + (right - to_right) * reach
+            left = to_left + (left - to_left) * fade
+            right = to_right + (right - to_right) * fade
+        return angle_left, angle_right, left, right
 
-def predict(
-    pieces: list[tuple[float, float, float]], left: float, right: float, lag_s: float
-) -> tuple[float, float, float, float]:
-    """Return angles turned and final speeds (left, right each) through first-order wheel loops."""
-    angle_left = angle_right = 0.0
-    for duration, goal_left, goal_right in pieces:
-        fade = math.exp(-duration / lag_s)
-        reach = lag_s * (1.0 - fade)
-        angle_left += goal_left * duration + (left - goal_left) * reach
-        angle_right += goal_right * duration + (right - goal_right) * reach
-        left = goal_left + (left - goal_left) * fade
-        right = goal_right + (right - goal_right) * fade
-    return angle_left, angle_right, left, right
+    @property
+    def omega(self) -> tuple[float, float]:
+        """Return the speeds (left, right) at the latest report."""
+        return self._omega[0], self._omega[1]
+
+    def step(self, dt_s: float, turned: tuple[float, float], pieces: list[Piece]) -> None:
+        """Take the angles turned (rad, left and right) in dt_s under the commands `pieces`."""
+        expected = self.ahead(pieces)
+        f = math.exp(-dt_s / self._lag)
+        g = self._lag * (1.0 - f)  # angle from one unit of speed, and dt - g from a shortfall
+        b = -(dt_s - g)
+        c = -(1.0 - f)
+        p00, p01, p02, p11, p12, p22 = self._p
+        # F = [[1, g, b], [0, f, c], [0, 0, 1]]; P = F P F' + Q
+        r0, r1, r2 = p00 + g * p01 + b * p02, p01 + g * p11 + b * p12, p02 + g * p12 + b * p22
+        t1, t2 = f * p11 + c * p12, f * p12 + c * p22
+        q = self._q_speed * dt_s * dt_s
+        n00 = r0 + g * r1 + b * r2 + 0.25 * q * dt_s * dt_s
+        n01 = f * r1 + c * r2 + 0.5 * q * dt_s
+        n11 = f * t1 + c * t2 + q
+        n22 = p22 + self._q_short * dt_s
+        k = 1.0 / (n00 + self._r)
+        for side in (0, 1):
+            error = self._offset[side] + expected[side] - turned[side]
+            self._offset[side] = error * (1.0 - n00 * k)
+            self._omega[side] = expected[2 + side] - n01 * k * error
+            self._short[side] -= r2 * k * error
+        self._p = (
+            n00 * (1.0 - n00 * k),
+            n01 * (1.0 - n00 * k),
+            r2 * (1.0 - n00 * k),
+            n11 - n01 * n01 * k,
+            t2 - n01 * r2 * k,
+            n22 - r2 * r2 * k,
+        )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from hil.errors import BadInput
 from hil.laws.asg_ism import AsgIsm
+from hil.laws.hold import HoldAtGoal
 from hil.laws.state_feedback import StateFeedback
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ OUTER_LAWS = ("asg-ism", "pid")
 def make_outer_law(name: str, gains: Gains, limits: OuterLimits, d0_m: float) -> OuterLaw:
     """Return the outer law `name` with its part of `gains`; `d0_m` is as believed (2.31)."""
     if name == "asg-ism":
-        return AsgIsm(gains.asg_ism, limits, d0_m)
+        return HoldAtGoal(AsgIsm(gains.asg_ism, limits, d0_m), limits)
     if name == "pid":
-        return StateFeedback(gains.pid, limits, d0_m)
+        return HoldAtGoal(StateFeedback(gains.pid, limits, d0_m), limits)
     raise BadInput(f"outer law {name!r} is unknown; choose one of {', '.join(OUTER_LAWS)}")

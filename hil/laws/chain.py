@@ -127,13 +127,13 @@ class Chain:
         # At the speed limit the robot does not accelerate: zeta says so, else z3 is a fiction.
         self.zeta = 0.0 if eta1 != eta1_free else zeta_next
         self._eta1_ref, self._w_ref = eta1, w
-        lag = limits.wheel_lag_s
+        lead = limits.lead_s
         return ChainCommand(
             v1,
             w_dot,
             zeta,
-            clip(eta1 + lag * self.zeta, limits.eta1_max_m_s),
-            clip(w + lag * (w_dot if w == w_free else 0.0), limits.theta_dot_max_rad_s),
+            clip(eta1 + lead * self.zeta, limits.eta1_max_m_s),
+            clip(w + lead * (w_dot if w == w_free else 0.0), limits.theta_dot_max_rad_s),
             saturated,
         )
 

@@ -9,10 +9,13 @@ from hil.estimator.odometry import (
     CommandHistory,
     WheelSpeeds,
     counts_between,
-    predict,
 )
 
 ROBOT = BelievedGeometry(0.05, 0.2, 0.03, 1920)
+
+
+def make_speeds():
+    return WheelSpeeds(0.06, 6.0, 0.5, ROBOT.rad_per_count)
 
 
 def test_signs_and_units_of_the_wheel_map():
@@ -46,14 +49,14 @@ def test_command_history_gives_constant_pieces():
 
 def test_lag_model_after_a_step_command():
     """From rest, after one time constant: speed (1 - 1/e) goal, angle goal tau / e."""
-    turned, _, speed, _ = predict([(0.06, 10.0, 0.0)], 0.0, 0.0, 0.06)
+    turned, _, speed, _ = make_speeds().ahead([(0.06, 10.0, 0.0)])
     assert speed == pytest.approx(10 * (1 - math.exp(-1)))
     assert turned == pytest.approx(10 * 0.06 * math.exp(-1))
 
 
 def test_speed_from_counts_settles_below_the_quantisation():
     """At 3.21 rad/s a difference over 20 ms is quantised to 0.16 rad/s; the filter to half."""
-    speeds = WheelSpeeds(0.06, 6.0, ROBOT.rad_per_count)
+    speeds = make_speeds()
     counts, errors = 0, []
     for k in range(1, 200):
         new = math.floor(3.21 * 0.02 * k / ROBOT.rad_per_count)
@@ -62,12 +65,13 @@ def test_speed_from_counts_settles_below_the_quantisation():
         speeds.step(0.02, (turned, turned), [(0.02, 3.21, 3.21)])
         errors.append(speeds.omega[0] - 3.21)
     late = errors[50:]
-    assert math.sqrt(sum(e * e for e in late) / len(late)) < 0.08
+    assert math.sqrt(sum(e * e for e in late) / len(late)) < 0.1
 
 
 def test_speed_follows_a_wheel_that_does_not_obey():
-    """Commanded 5 rad/s but blocked: the speed estimate says at rest, not 5."""
-    speeds = WheelSpeeds(0.06, 6.0, ROBOT.rad_per_count)
+    """Commanded 5 rad/s but blocked: within a second speed and prediction say at rest, not 5."""
+    speeds = make_speeds()
     for _ in range(50):
         speeds.step(0.02, (0.0, 0.0), [(0.02, 5.0, 5.0)])
-    assert abs(speeds.omega[0]) < 0.7
+    assert abs(speeds.omega[0]) < 0.01
+    assert abs(speeds.ahead([(0.06, 5.0, 5.0)])[2]) < 0.01

@@ -34,8 +34,8 @@ def test_without_restrictions_it_is_the_printed_state_feedback():
 
 def test_integral_waits_while_saturated_and_removes_a_steady_push():
     """Against a push of 30 mm/s along the way, PID with Ki ends at the point."""
-    gains = CIRCLE_GAINS.model_copy(update={"pid": PidGains(kp_s3=6, ki_s4=1, kd1_s2=11, kd2_s=6)})
-    law = make_outer_law("pid", gains, OuterLimits(wheel_lag_s=0), D0_M)
+    gains = PidGains(kp_s3=6, ki_s4=1, kd1_s2=11, kd2_s=6)
+    law = StateFeedback(gains, OuterLimits(lead_s=0), D0_M)
     run = drive_to(law, (-0.6, 0.0, 0.0), (0.3, 0.0), push=0.03, seconds=30)
     assert run.error((0.3, 0.0)) < 0.003
     # An integral that had grown over the whole way would carry the robot far past the point.
