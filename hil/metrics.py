@@ -77,7 +77,7 @@ METRICS = (
            "sum of |change| of the forward speed commanded"),
     Metric("theta_dot_variation_rad_s", "rad/s", "variation of turn command",
            "sum of |change| of the turn rate commanded"),
-    Metric("pwm_variation_counts", "counts", "variation of PWM (chatter)",
+    Metric("pwm_variation_counts", "counts", "variation of PWM",
            "sum of |change| of PWM of both sides, as sampled at each outer tick"),
     Metric("s_sign_changes_hz", "1/s", "sign changes of s",
            "sign changes of s_x and s_y together, per second"),

@@ -79,7 +79,7 @@ def command(
     if view:
         from hil.record.viewer import open_viewer
 
-        open_viewer([record.path])
+        click.echo(open_viewer([record.path]), err=True)
     return exit_status(record)
 
 

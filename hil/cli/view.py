@@ -13,4 +13,4 @@ def command(runs: tuple[Path, ...]) -> None:
     """Open one or several run records in the viewer, on a common timeline."""
     from hil.record.viewer import open_viewer
 
-    open_viewer(list(runs))
+    click.echo(open_viewer(list(runs)), err=True)

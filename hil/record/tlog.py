@@ -5,10 +5,13 @@ The format of MAVLink ground stations; `mavlogdump.py` and MAVProxy read it (doc
 
 from __future__ import annotations
 
+import shutil
 import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
+
+from hil.errors import BadInput
 
 _STAMP = struct.Struct(">Q")
 _MAGIC_2 = 0xFD
@@ -60,3 +63,26 @@ def read_tlog(path: Path) -> Iterator[LoggedFrame]:
             return
         yield LoggedFrame(stamp, data[start:end])
         at = end
+
+
+def install_dialect(folder: Path | None = None) -> Path:
+    """Copy the project's dialect to where MAVLink tools look for one, as `hil.py`; return it.
+
+    That is the `dialects/v20` folder of the installed pymavlink unless another one is given.
+    `mavlogdump.py --dialect hil` and MAVProxy then read the project's own messages by name.
+    Raises BadInput when the folder cannot be written.
+    """
+    import pymavlink.dialects.v20 as dialects  # noqa: PLC0415 - for this errand only
+
+    from hil.wire import dialect  # noqa: PLC0415
+
+    target = (folder or Path(next(iter(dialects.__path__)))) / "hil.py"
+    try:
+        shutil.copyfile(str(dialect.__file__), target)
+    except OSError as error:
+        raise BadInput(f"{target}: the dialect cannot be put there: {error.strerror}") from None
+    return target
+
+
+if __name__ == "__main__":
+    print(f"installed: {install_dialect()}")

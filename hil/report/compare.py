@@ -161,14 +161,17 @@ def better_of(metric: Metric, values: Sequence[float]) -> int | None:
 
     A settling time that does not exist means "never settled" and loses against any that does.
     """
-    never = math.inf if metric.name.startswith("settling") else math.nan
-    ranked = [never if math.isnan(value) else value for value in values]
+    ranked = [math.inf if _is_never(metric, value) else value for value in values]
     sign = -1.0 if metric.better == "higher" else 1.0
     order = sorted((sign * value, i) for i, value in enumerate(ranked) if not math.isnan(value))
     if metric.better == "neither" or len(order) < 2 or order[0][0] == order[1][0]:
         return None
     low, high = sorted(abs(ranked[order[k][1]]) for k in (0, 1))
     return order[0][1] if low == 0.0 or high / low >= _EQUAL_RATIO else None
+
+
+def _is_never(metric: Metric, value: float) -> bool:
+    return metric.name.startswith("settling") and math.isnan(value)
 
 
 def findings(comparison: Comparison) -> list[str]:
@@ -180,7 +183,7 @@ def findings(comparison: Comparison) -> list[str]:
         metric = BY_NAME[name]
         values = [entry.figures.values[name] for entry in comparison.entries]
         told = ", ".join(
-            f"{entry.label} {metric.text(value)}"
+            f"{entry.label} {'never' if _is_never(metric, value) else metric.text(value)}"
             for entry, value in zip(comparison.entries, values, strict=True)
         )
         index = better_of(metric, values)
@@ -203,6 +206,8 @@ def findings(comparison: Comparison) -> list[str]:
 def _factor(metric: Metric, values: Sequence[float], index: int) -> str:
     """Return " by a factor of ..." between the best value and the next one."""
     rivals = [v for i, v in enumerate(values) if i != index and math.isfinite(v)]
+    if not rivals:
+        return ""
     best = values[index]
     nearest = min(rivals) if metric.better == "lower" else max(rivals)
     low, high = sorted((best, nearest))

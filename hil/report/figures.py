@@ -108,11 +108,11 @@ class Sheet:
             FigureCanvasSVG(self.figure)
             self.axes: list[Axes] = list(self.figure.subplots(1, panels, squeeze=False)[0])
             self.figure.subplots_adjust(
-                left=0.62 / _WIDTH_IN,
+                left=0.7 / _WIDTH_IN,
                 right=1.0 - 0.08 / _WIDTH_IN,
                 bottom=0.42 / height_in,
                 top=1.0 - 0.32 / height_in,
-                wspace=0.24,
+                wspace=0.27,
             )
 
     def label(self, panel: int, y_title: str, x_title: str = "t in s") -> None:
@@ -128,7 +128,7 @@ class Sheet:
         with mpl.rc_context(_STYLE | {"svg.hashsalt": name}):
             self.figure.legend(
                 list(lines.values()), list(lines), ncols=len(lines), columnspacing=1.6,
-                handlelength=1.6, loc="upper left", bbox_to_anchor=(0.47 / _WIDTH_IN, 1.01),
+                handlelength=1.6, loc="upper left", bbox_to_anchor=(0.55 / _WIDTH_IN, 1.01),
             )  # fmt: skip
             self.figure.savefig(out, format="svg", transparent=True, metadata={"Date": None})
         return _for_page(out.getvalue())
@@ -178,7 +178,8 @@ def path_figure(runs: Sequence[Trace], name: str) -> str:
 
 def _draw_start(axes: Axes, samples: Columns) -> None:
     """Mark the start with an arrow of 10 cm along the heading."""
-    x_m, y_m, theta = (samples[f"est_{key}"][0] for key in ("x_m", "y_m", "theta_rad"))
+    who = "true" if metrics.has_truth(samples) else "est"
+    x_m, y_m, theta = (samples[f"{who}_{key}"][0] for key in ("x_m", "y_m", "theta_rad"))
     step = (0.1 * np.cos(theta), 0.1 * np.sin(theta))
     axes.arrow(x_m, y_m, *step, width=0.002, head_width=0.014, head_length=0.03,
                length_includes_head=True, color=_INK, lw=0)  # fmt: skip

@@ -1,0 +1,92 @@
+"""The Rerun file holds every chart, the floor plan, camera and events on one timeline."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+
+import pytest
+
+from hil.errors import BadInput
+from hil.record import viewer
+from hil.record.rrd import PLOTS, entity_names, write_rrd
+from hil.record.schema import SAMPLE_NAMES
+from tests.record.synthetic import make_run, scenario
+
+
+def rerun(*arguments):
+    """Run Rerun's own command line, which reads the file with other code than wrote it."""
+    command = [sys.executable, "-m", "rerun", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs")
+    return [
+        make_run(folder / law, law, images=law == "pid", rerun=law == "pid")
+        for law in ("pid", "asg-ism")
+    ]
+
+
+def test_recorder_writes_a_valid_file_with_everything(runs):
+    """A closed record has a run.rrd that Rerun verifies, with the run's entities in it."""
+    path = runs[0].path / "run.rrd"
+    rerun("rrd", "verify", path)
+    text = rerun("rrd", "print", path)
+    for entity in ("floor/robot", "floor/path", "camera/image", "camera/image/marks", "events"):
+        assert f"/scenario-1/pid/{entity}" in text
+    for plot in PLOTS:
+        there = f"/scenario-1/pid/{plot.key}" in text
+        assert there is (plot.key != "sliding"), plot.key  # PID has no sliding variable
+
+
+def test_plots_name_columns_of_the_schema():
+    """Every line of a chart is a recorded column or the error derived from it."""
+    columns = [column for plot in PLOTS for _, column, _ in plot.lines]
+    assert all(name in SAMPLE_NAMES or name.startswith("error_") for name in columns)
+
+
+def test_several_runs_share_a_timeline_under_names_of_their_own(runs, tmp_path):
+    """Two runs in one file stand under their law; two of one law are numbered."""
+    path = tmp_path / "both.rrd"
+    write_rrd(path, runs)
+    text = rerun("rrd", "print", path)
+    assert "/scenario-1/pid/error" in text
+    assert "/scenario-1/asg-ism/error" in text
+    assert "/scenario-1/asg-ism/sliding" in text
+    assert entity_names([runs[0], runs[0]]) == ["scenario-1/pid-1", "scenario-1/pid-2"]
+
+
+def test_a_run_of_20_s_is_written_in_a_fraction_of_a_second(tmp_path):
+    """Column batches keep the cost of the file far below that of the run (0.3 s per 20 s)."""
+    run = make_run(tmp_path / "long", tree=scenario(duration_s=20.0))
+    best_s = float("inf")
+    for number in range(3):
+        start_s = time.perf_counter()
+        write_rrd(tmp_path / f"{number}.rrd", [run])
+        best_s = min(best_s, time.perf_counter() - start_s)
+    assert best_s < 0.3
+
+
+def test_viewer_without_a_display_says_how_to_look_elsewhere(runs, monkeypatch):
+    """No display: one line with the file and the command for a browser; nothing is started."""
+    monkeypatch.setattr(viewer, "has_display", lambda _environ: False)
+    with monkeypatch.context() as patch:
+        patch.setattr(viewer.subprocess, "Popen", None)
+        line = viewer.open_viewer([runs[0].path])
+    assert str(runs[0].path / "run.rrd") in line
+    assert "--serve-web" in line
+    several = viewer.viewable_file([run.path for run in runs])
+    rerun("rrd", "verify", several)
+    with pytest.raises(BadInput, match="not a run record"):
+        viewer.open_viewer([runs[0].path.parent])
+
+
+def test_display_is_told_by_the_environment():
+    """X11 or Wayland on Linux; macOS and Windows always have one."""
+    assert viewer.has_display({"DISPLAY": ":0"}, "linux")
+    assert viewer.has_display({"WAYLAND_DISPLAY": "wayland-0"}, "linux")
+    assert not viewer.has_display({}, "linux")
+    assert viewer.has_display({}, "darwin")

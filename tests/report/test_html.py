@@ -1,0 +1,180 @@
+"""The report is one self-contained page with every figure, caption, verdict and assumption."""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+from html.parser import HTMLParser
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from hil.errors import BadInput
+from hil.metrics import METRICS
+from hil.report.assumptions import assumptions
+from hil.report.circle import CircleStudy
+from hil.report.compare import compare_runs
+from hil.report.html import render, write_report
+from tests.record.synthetic import make_run, scenario
+
+
+@pytest.fixture(scope="module")
+def comparisons(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs")
+    return [
+        compare_runs(
+            [make_run(folder / f"{name}-{law}", law, tree=scenario(name), images=law == "pid",
+                      rate_hz=rate)
+             for law, rate in (("pid", 2.0), ("asg-ism", 2.6))]
+        )
+        for name in ("scenario-1", "scenario-2")
+    ]  # fmt: skip
+
+
+def circle():
+    """Return a study whose figures are known: errors 3 mm and 1 mm, ||s|| at most 0.01."""
+    t_s = np.linspace(0.0, 20.0, 2001)
+
+    def run(error_m, s):
+        pairs = np.column_stack((np.cos(t_s), np.sin(t_s)))
+        flat = np.column_stack((np.full(t_s.size, error_m), np.zeros(t_s.size)))
+        layer = np.column_stack((np.full(t_s.size, s), np.zeros(t_s.size)))
+        return SimpleNamespace(
+            t_s=t_s, z1_m=pairs + flat, z1_ref_m=pairs, delta1_m=flat, s=layer, u=pairs
+        )
+
+    return CircleStudy.of(
+        {"asg-ism": run(0.001, 0.01), "pid": run(0.003, math.nan)}, 0.02, "0.1 sin(3 t) m/s²"
+    )
+
+
+@pytest.fixture(scope="module")
+def page(comparisons):
+    return render(comparisons, command="hil experiment --seed 1", circle=circle())
+
+
+def test_page_needs_no_network(page):
+    """No address of another place: scripts, styles, fonts and images are all inside."""
+    outside = re.findall(r"""(?:src|href|url\()\s*=?\s*["']?(https?:|//|/|\w+\.\w)""", page)
+    assert outside == []
+    assert "<script" not in page
+    assert page.count("data:image/jpeg;base64,") == 2 * 3
+
+
+def test_page_is_well_formed(page):
+    """Every element that is opened is closed, in order."""
+    void = {"meta", "br", "img", "link", "hr", "input"}
+
+    class Checker(HTMLParser):
+        def __init__(self):
+            super().__init__()
+            self.open = []
+
+        def handle_starttag(self, tag, attrs):  # noqa: ARG002
+            if tag not in void:
+                self.open.append(tag)
+
+        def handle_endtag(self, tag):
+            assert self.open.pop() == tag
+
+        def handle_startendtag(self, tag, attrs):
+            pass
+
+    checker = Checker()
+    checker.feed(page)
+    assert checker.open == []
+
+
+def test_every_thesis_figure_is_there(page):
+    """Figures 8.10 to 8.12 and 8.14 to 8.16, photographs, and 8.2 to 8.4, each with a caption."""
+    for number in ("8.10", "8.11", "8.12", "8.13", "8.14", "8.15", "8.16", "8.2", "8.3", "8.4"):
+        assert f"(thesis figure {number})" in page
+    svgs = re.findall(r"<svg.*?</svg>", page, flags=re.DOTALL)
+    assert len(svgs) == 2 * 5 + 4
+    for svg in svgs:
+        ElementTree.fromstring(svg)
+        assert "var(--run-" in svg
+        assert not re.search(r"#[0-9a-f]{6}", svg)  # every colour follows the page
+
+
+def test_identifiers_of_figures_do_not_collide(page):
+    """An id occurs once in the page, or a clip of one figure would cut another."""
+    found = re.findall(r'\bid="([^"]+)"', page)
+    assert len(found) == len(set(found))
+
+
+def test_every_metric_unit_and_requirement_is_there(page):
+    """Each figure stands with its label; each requirement with its verdict; findings beside."""
+    for metric in METRICS:
+        assert metric.label in page
+    assert "delta1_worst_last_second_m &lt;= 0.02 m" in page
+    assert "What the figures say" in page
+    assert "hil experiment --seed 1" in page
+
+
+def test_failures_are_told_at_the_top(tmp_path):
+    """A run that misses its requirement is named in the summary, not hidden below."""
+    runs = [
+        make_run(tmp_path / law, law, rate_hz=rate) for law, rate in (("pid", 2), ("asg-ism", 0.2))
+    ]
+    page = render([compare_runs(runs)], command="hil compare a b")
+    assert "asg-ism never; pid is better." in page
+    assert "1 of 2 runs did not meet every requirement: scenario-1 asg-ism." in page
+
+
+def test_text_from_a_record_cannot_become_markup(tmp_path):
+    """A scenario may be called anything; the page shows it as text."""
+    tree = scenario() | {"name": "a <script>x</script> & b"}
+    runs = [make_run(tmp_path / law, law, tree=tree) for law in ("pid", "asg-ism")]
+    page = render([compare_runs(runs)], command="<b>")
+    assert "<script" not in page
+    assert "&lt;script&gt;" in page
+
+
+def test_circle_findings_are_computed_and_honest():
+    """Integral of 9 mm² over 20 s against 1 mm²; leaving the layer is said in capitals."""
+    lines = circle().findings()
+    assert "stays in the layer" in lines[0]
+    assert "pid 0.00018 m²·s, asg-ism 2e-05 m²·s; asg-ism is better by a factor of 9" in lines[1]
+    assert "pid 3 mm, asg-ism 1 mm" in lines[2]
+    narrow = CircleStudy(circle().runs, 0.005, "")
+    assert "LEAVES the layer" in narrow.findings()[0]
+
+
+def test_report_that_cannot_be_written_is_one_clear_line(comparisons, tmp_path):
+    """A folder that is not there: one line, and nothing half-written anywhere."""
+    with pytest.raises(BadInput, match="cannot be written: No such file"):
+        write_report(tmp_path / "nowhere" / "r.html", comparisons, command="x")
+    write_report(tmp_path / "r.html", comparisons, command="x")
+    assert [path.name for path in tmp_path.iterdir()] == ["r.html"]
+
+
+def test_report_is_fast(comparisons):
+    """Two scenarios are drawn in a few seconds even on a busy machine."""
+    start_s = time.perf_counter()
+    render(comparisons, command="x")
+    assert time.perf_counter() - start_s < 6.0
+
+
+def test_assumptions_carry_unit_meaning_and_source():
+    """Values of a resolved scenario come with unit, meaning of the field, and the file's comment."""
+    tree = {
+        "name": "scenario-1",
+        "duration_s": 20.0,
+        "robot": {"wheel_radius_m": 0.0482, "motor": {"gear_ratio": 30.0}},
+        "disturbances": [{"start_s": 1.0}],
+        "control": {"gains": {"k": 1}},
+    }
+    items = {item.key: item for _, group in assumptions(tree) for item in group}
+    radius = items["robot.wheel_radius_m"]
+    assert (radius.value, radius.unit) == ("0.0482", "m")
+    assert radius.meaning
+    assert "table 8.3" in radius.source
+    assert (
+        "30:1" in items["robot.motor.gear_ratio"].source or items["robot.motor.gear_ratio"].source
+    )
+    assert "disturbances.0.start_s" in items
+    assert not any(key.startswith("control.gains") for key in items)
