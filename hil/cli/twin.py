@@ -59,3 +59,4 @@ def serve(
     finally:
         server.close()
         rig.close()
+        click.echo(f"ended; kept real time within {server.worst_lag_s * 1e3:.0f} ms", err=True)
