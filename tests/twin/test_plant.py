@@ -251,6 +251,27 @@ def test_energy_from_the_battery_is_motion_heat_and_nothing_else(variant):
     assert kinetic_j(after) + magnetic_j(after) + heat == pytest.approx(taken, rel=1e-3)
 
 
+def stored_power_w(model):
+    """Rate of kinetic + magnetic energy with the motors short-circuited."""
+    s, d = named(model.state), rates(model)
+    inertias = {
+        "eta1_m_s": MASS, "eta2_m_s": MASS, "theta_dot_rad_s": 0.024,
+        "omega_left_rad_s": 2.08e-3, "omega_right_rad_s": 2.08e-3,
+        "current_left_a": 5e-3, "current_right_a": 5e-3,
+    }  # fmt: skip
+    return sum(inertia * s[name] * d[name] for name, inertia in inertias.items())
+
+
+def test_a_gear_driven_by_its_wheel_loses_power_too():
+    """Braking with 1 A at 10.37 rad/s: 4 x (5 W windings + 0.3 x 0.36 N m x 10.37 rad/s gear) lost.
+
+    The printed tau = eta_g k_t N i would have the gear add its 4.48 W instead of taking them.
+    """
+    model = plant(ideal_robot(motor_gear_efficiency_ratio=0.7))
+    moving(model, eta1_m_s=0.5, current_left_a=-1.0, current_right_a=-1.0)
+    assert stored_power_w(model) == pytest.approx(-20.0 - 4.48, abs=0.01)
+
+
 @settings(max_examples=200, deadline=None)
 @given(
     variant=st.sampled_from(["constrained", "slip"]),
@@ -266,16 +287,7 @@ def test_without_a_battery_energy_only_falls(variant, eta1, w, currents):
     model = plant(robot(variant=variant))
     moving(model, eta1_m_s=eta1, theta_dot_rad_s=w,
            current_left_a=currents[0], current_right_a=currents[1])  # fmt: skip
-    s, d = named(model.state), rates(model)
-    power = sum(
-        inertia * s[name] * d[name]
-        for name, inertia in {
-            "eta1_m_s": MASS, "eta2_m_s": MASS, "theta_dot_rad_s": 0.024,
-            "omega_left_rad_s": 2.08e-3, "omega_right_rad_s": 2.08e-3,
-            "current_left_a": 5e-3, "current_right_a": 5e-3,
-        }.items()
-    )  # fmt: skip
-    assert power <= 1e-9
+    assert stored_power_w(model) <= 1e-9
 
 
 def smooth_end(step_s):
