@@ -7,9 +7,8 @@ namespace hil {
 namespace host_port {
 namespace {
 
-constexpr uint8_t kPiece = 32;
 // A port without a good frame for this long gives way to the other when that one has bytes: a line
-// full of noise then takes the board for a second at most.
+// full of noise then keeps the board for a second at most.
 constexpr uint32_t kSilence_us = 1000000UL;
 
 uart::Port g_host = uart::kBluetooth;
@@ -19,29 +18,32 @@ uint16_t g_frames;
 uart::Port other(uart::Port port) { return port == uart::kUsb ? uart::kBluetooth : uart::kUsb; }
 
 void receive(Board& board) {
-  uint8_t bytes[kPiece];
-  while (const uint8_t n = uart::read(g_host, bytes, kPiece)) {
-    board_receive(board, bytes, n, ticker::now_us());
-  }
-  if (board.link.received != g_frames) {
-    g_frames = board.link.received;
-    g_heard_us = ticker::now_us();
-  }
-  if (uart::read(other(g_host), bytes, kPiece) == 0) return;
-  if (ticker::now_us() - g_heard_us < kSilence_us) return;
-  g_host = other(g_host);
-  g_heard_us = ticker::now_us();
+  const uart::Span bytes = uart::received(g_host);
+  if (bytes.size == 0) return;
+  const uint32_t now_us = ticker::now_us();
+  board_receive(board, bytes.data, bytes.size, now_us);
+  uart::drop(g_host, bytes.size);
+  if (board.link.received == g_frames) return;
+  g_frames = board.link.received;
+  g_heard_us = now_us;
+}
+
+void watch_other() {
+  const uart::Port port = other(g_host);
+  const uart::Span bytes = uart::received(port);
+  if (bytes.size == 0) return;
+  const uint32_t now_us = ticker::now_us();
+  if (now_us - g_heard_us < kSilence_us) return uart::drop(port, bytes.size);
+  g_host = port;
+  g_heard_us = now_us;
 }
 
 void transmit(Board& board) {
-  uint8_t bytes[kPiece];
   for (;;) {
-    const uint8_t usb = uart::room(uart::kUsb), bluetooth = uart::room(uart::kBluetooth);
-    const uint8_t room = usb < bluetooth ? usb : bluetooth;
-    const uint8_t n = board_transmit(board, bytes, room < kPiece ? room : kPiece);
+    const uart::Span room = uart::room(g_host);
+    const uint8_t n = board_transmit(board, room.data, room.size);
     if (n == 0) return;
-    uart::write(uart::kUsb, bytes, n);
-    uart::write(uart::kBluetooth, bytes, n);
+    uart::send(g_host, n);
   }
 }
 
@@ -49,6 +51,7 @@ void transmit(Board& board) {
 
 void pump(Board& board) {
   receive(board);
+  watch_other();
   transmit(board);
 }
 

@@ -1,5 +1,5 @@
-// Which of the two serial ports the host is on. Both are listened to and both carry the reports; the
-// bytes of one at a time go to the board, or frames of two hosts would mix.
+// Which of the two serial ports the host is on. Both are listened to, but only one at a time is the
+// board's, or the frames of two hosts would mix. At power-up it is the Bluetooth one.
 #pragma once
 
 #include "../core/board.h"

@@ -15,7 +15,8 @@ namespace {
 constexpr uint16_t kCountsPerTick = F_CPU / 8 / (1000000UL / TICK_US);
 static_assert(F_CPU / 8 == 2000000UL, "now_us() takes two counts for a microsecond");
 
-volatile uint32_t g_ticks;
+volatile uint8_t g_ticks;
+volatile uint32_t g_tick_us;  // time at the last tick
 
 }  // namespace
 
@@ -26,23 +27,26 @@ void start() {
   TIMSK5 = _BV(OCIE5A);
 }
 
-uint8_t count() { return static_cast<uint8_t>(g_ticks); }  // one byte: read in one instruction
+uint8_t count() { return g_ticks; }
 
 uint32_t now_us() {
-  uint32_t ticks;
+  uint32_t t_us;
   uint16_t counts;
   bool wrapped;
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
     counts = TCNT5;
     wrapped = TIFR5 & _BV(OCF5A);
-    ticks = g_ticks;
+    t_us = g_tick_us;
   }
   // The timer may have cleared with its interrupt still waiting; a count read before that is high.
-  if (wrapped && counts < kCountsPerTick / 2) ++ticks;
-  return ticks * TICK_US + counts / 2;
+  if (wrapped && counts < kCountsPerTick / 2) t_us += TICK_US;
+  return t_us + counts / 2;
 }
 
-ISR(TIMER5_COMPA_vect) { ++g_ticks; }
+ISR(TIMER5_COMPA_vect) {
+  ++g_ticks;
+  g_tick_us += TICK_US;
+}
 
 }  // namespace ticker
 }  // namespace hil

@@ -15,6 +15,10 @@ namespace {
 constexpr uint8_t kReceiveSize = 128;
 constexpr uint8_t kTransmitSize = 64;
 
+// Ring sizes are powers of two: a mask wraps an index in one instruction, `%` would call a division.
+inline uint8_t in_receive(uint8_t index) { return index & (kReceiveSize - 1); }
+inline uint8_t in_transmit(uint8_t index) { return index & (kTransmitSize - 1); }
+
 struct Channel {
   volatile uint8_t rx_head, rx_tail, tx_head, tx_tail;  // heads are written to, tails taken from
   volatile uint8_t lost;                                // since last asked for
@@ -25,10 +29,13 @@ struct Channel {
 Channel g_channels[kPorts];
 uint16_t g_lost;
 
-inline void on_received(Channel& channel, uint8_t status, uint8_t byte) {
+// Handlers are inlined by force: a call would have them save every register a function may use.
+#define HIL_IN_HANDLER inline __attribute__((always_inline))
+
+HIL_IN_HANDLER void on_received(Channel& channel, uint8_t status, uint8_t byte) {
   if (status & _BV(DOR0)) ++channel.lost;  // one before this was overrun; this one is good
   const uint8_t head = channel.rx_head;
-  const uint8_t next = (head + 1) % kReceiveSize;
+  const uint8_t next = in_receive(head + 1);
   if ((status & _BV(FE0)) || next == channel.rx_tail) {
     ++channel.lost;
     return;
@@ -38,11 +45,11 @@ inline void on_received(Channel& channel, uint8_t status, uint8_t byte) {
 }
 
 // Returns true when there is nothing left to send and the interrupt can rest.
-inline bool on_empty(Channel& channel, volatile uint8_t& data) {
+HIL_IN_HANDLER bool on_empty(Channel& channel, volatile uint8_t& data) {
   const uint8_t tail = channel.tx_tail;
   if (tail == channel.tx_head) return true;
   data = channel.tx[tail];
-  channel.tx_tail = (tail + 1) % kTransmitSize;
+  channel.tx_tail = in_transmit(tail + 1);
   return false;
 }
 
@@ -61,31 +68,28 @@ void start() {
   UCSR0B = UCSR1B = kEnable;
 }
 
-uint8_t read(Port port, uint8_t* out, uint8_t max) {
+Span received(Port port) {
   Channel& channel = g_channels[port];
-  uint8_t tail = channel.rx_tail;
-  uint8_t n = 0;
-  for (const uint8_t head = channel.rx_head; n < max && tail != head; ++n) {
-    out[n] = channel.rx[tail];
-    tail = (tail + 1) % kReceiveSize;
-  }
-  channel.rx_tail = tail;
-  return n;
+  const uint8_t tail = channel.rx_tail, head = channel.rx_head;
+  return {channel.rx + tail, static_cast<uint8_t>((head < tail ? kReceiveSize : head) - tail)};
 }
 
-uint8_t room(Port port) {
-  const Channel& channel = g_channels[port];
-  return (channel.tx_tail - channel.tx_head - 1) % kTransmitSize;
+void drop(Port port, uint8_t n) {
+  Channel& channel = g_channels[port];
+  channel.rx_tail = in_receive(channel.rx_tail + n);
 }
 
-void write(Port port, const uint8_t* data, uint8_t n) {
+Span room(Port port) {
   Channel& channel = g_channels[port];
-  uint8_t head = channel.tx_head;
-  for (uint8_t i = 0; i < n; ++i) {
-    channel.tx[head] = data[i];
-    head = (head + 1) % kTransmitSize;
-  }
-  channel.tx_head = head;
+  const uint8_t tail = channel.tx_tail, head = channel.tx_head;
+  const uint8_t free = in_transmit(tail - head - 1);
+  const uint8_t to_end = kTransmitSize - head;
+  return {channel.tx + head, free < to_end ? free : to_end};
+}
+
+void send(Port port, uint8_t n) {
+  Channel& channel = g_channels[port];
+  channel.tx_head = in_transmit(channel.tx_head + n);
   // Set by the main program only and cleared by the interrupt only: a clear between read and
   // write of the register costs one idle interrupt and loses nothing.
   if (port == kUsb) {

@@ -12,16 +12,21 @@ constexpr uint32_t kBaud = 57600;
 
 void start();
 
-// Up to `max` received bytes; returns how many.
-uint8_t read(Port port, uint8_t* out, uint8_t max);
+// A stretch of a ring, read or filled in place.
+struct Span {
+  uint8_t* data;
+  uint8_t size;
+};
 
-// Room in the transmit ring, in bytes.
-uint8_t room(Port port);
+// Received bytes, as far as they lie in one piece; drop() takes the first n of them off.
+Span received(Port port);
+void drop(Port port, uint8_t n);
 
-// Queues `n` bytes; the caller has asked for room.
-void write(Port port, const uint8_t* data, uint8_t n);
+// Room to put bytes to send, as far as it lies in one piece; send() takes the first n to be filled.
+Span room(Port port);
+void send(Port port, uint8_t n);
 
-// Bytes received or waiting; cheap enough to ask with interrupts off before sleeping.
+// Whether either port has received bytes; cheap enough to ask with interrupts off before sleeping.
 bool has_received();
 
 // Received bytes dropped so far: ring full, or overrun and framing errors of the hardware.

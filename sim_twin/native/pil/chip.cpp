@@ -67,7 +67,10 @@ void Chip::load(const std::string& elf_path) {
     throw std::runtime_error(elf_path + ": not an ELF of the board");
   }
   avr_load_firmware(avr_, &firmware);
-  program_end_ = kRamStart + firmware.datasize + firmware.bsssize;
+  for (std::uint32_t i = 0; i < firmware.symbolcount; ++i) {  // RAM is at 0x800000 in the ELF
+    const avr_symbol_t& symbol = *firmware.symbol[i];
+    if (std::strcmp(symbol.symbol, "_end") == 0) program_end_ = symbol.addr & 0xFFFF;
+  }
 }
 
 avr_io_t* Chip::module(const char* kind, char name) const {
