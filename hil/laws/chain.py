@@ -46,20 +46,24 @@ def clip(value: float, limit: float) -> float:
 
 
 def damped_inverse(
-    jerk_e: float, jerk_n: float, *, eta1: float, w: float, zeta: float, limits: OuterLimits
+    jerk_e: float,
+    jerk_n: float,
+    *,
+    eta1: float,
+    w: float,
+    zeta: float,
+    w_dot_rest: float,
+    lambda_m_s: float,
 ) -> tuple[float, float]:
     """Return (v1, w_dot) that give the wanted jerk, regularised where det B = -eta1/d0 vanishes.
 
-    w_dot minimises (eta1 w_dot - r)^2 + lambda^2 (w_dot + w/spin_decay)^2 with
-    r = jerk_n - 2 zeta w: the exact inverse at speed, and a turn that dies out at standstill,
-    where the plain damped inverse det/(det^2 + lambda^2) would leave the robot spinning.
+    w_dot minimises (eta1 w_dot - r)^2 + lambda^2 (w_dot - w_dot_rest)^2, r = jerk_n - 2 zeta w: the
+    exact inverse at speed, and `w_dot_rest` at standstill, where the plain damped inverse
+    det/(det^2 + lambda^2) would leave a turn standing.
     """
-    v1 = jerk_e + eta1 * w * w
-    lam2 = limits.lambda_m_s * limits.lambda_m_s
-    w_dot = (eta1 * (jerk_n - 2.0 * zeta * w) - lam2 * w / limits.spin_decay_s) / (
-        eta1 * eta1 + lam2
-    )
-    return v1, w_dot
+    lam2 = lambda_m_s * lambda_m_s
+    w_dot = (eta1 * (jerk_n - 2.0 * zeta * w) + lam2 * w_dot_rest) / (eta1 * eta1 + lam2)
+    return jerk_e + eta1 * w * w, w_dot
 
 
 class Chain:
@@ -107,7 +111,9 @@ class Chain:
             eta1=state.eta1,
             w=state.w,
             zeta=zeta,
-            limits=limits,
+            # The set-point decays, not the turn rate seen: a wheel that sticks shall not wind it up.
+            w_dot_rest=-self._w_ref / limits.spin_decay_s,
+            lambda_m_s=limits.lambda_m_s,
         )
         v1 = clip(v1_free, limits.v1_max_m_s3)
         w_dot = clip(w_dot_free, limits.theta_ddot_max_rad_s2)

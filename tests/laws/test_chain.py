@@ -11,8 +11,6 @@ from hil.config.control import OuterLimits
 from hil.laws.chain import Chain, damped_inverse, restrict
 from tests.laws.support import D0_M, estimate
 
-EXACT = OuterLimits(lambda_m_s=1e-4)
-
 
 def symbols_and_third_derivative():
     """Return the symbols and d3z/dt3 of z = [X + d0 cos, Y + d0 sin] along (2.30), (2.34)."""
@@ -73,7 +71,13 @@ def test_heading_split_inverts_the_closed_form(*, theta, eta1, w, zeta, jx, jy, 
     eta1 = -eta1 if backwards else eta1
     c, s = math.cos(theta), math.sin(theta)
     v1, w_dot = damped_inverse(
-        c * jx + s * jy, c * jy - s * jx, eta1=eta1, w=w, zeta=zeta, limits=EXACT
+        c * jx + s * jy,
+        c * jy - s * jx,
+        eta1=eta1,
+        w=w,
+        zeta=zeta,
+        w_dot_rest=0.0,
+        lambda_m_s=1e-4,
     )
     eta2, u2 = -D0_M * w, -D0_M * w_dot
     third_x = (
@@ -87,13 +91,23 @@ def test_heading_split_inverts_the_closed_form(*, theta, eta1, w, zeta, jx, jy, 
 
 
 def test_inverse_is_bounded_at_standstill_and_lets_a_turn_die():
-    """At eta1 = 0 no lateral jerk is asked of B; the turn decays at 1/spin_decay instead."""
-    limits = OuterLimits(lambda_m_s=0.05, spin_decay_s=0.2)
-    _, w_dot = damped_inverse(0.0, 100.0, eta1=0.0, w=1.0, zeta=0.1, limits=limits)
-    assert w_dot == pytest.approx(-1.0 / 0.2)
+    """At eta1 = 0 no lateral jerk is asked of B; the turn's set-point decays instead."""
+    at_rest = {"w": 0.0, "zeta": 0.0, "lambda_m_s": 0.05}
+    _, w_dot = damped_inverse(0.0, 100.0, eta1=0.0, w_dot_rest=-5.0, **at_rest)
+    assert w_dot == -5.0
     # The largest gain from lateral jerk to w_dot is 1/(2 lambda), at eta1 = lambda.
-    _, peak = damped_inverse(0.0, 1.0, eta1=0.05, w=0.0, zeta=0.0, limits=limits)
+    _, peak = damped_inverse(0.0, 1.0, eta1=0.05, w_dot_rest=0.0, **at_rest)
     assert peak == pytest.approx(1.0 / (2 * 0.05))
+
+
+def test_turn_set_point_dies_out_on_a_robot_that_sticks():
+    """Stuck at rest after a turn command of 1 rad/s: 0.2 s later it is a third, 1 s later nothing."""
+    chain = Chain(OuterLimits(spin_decay_s=0.2, lead_s=0.0))
+    chain.reset(estimate(eta1=0.3, w=1.0), (1.0, 0.0))
+    stuck = chain.state(estimate())
+    out = [chain.command((0.0, 0.0), stuck, 0.01).w for _ in range(100)]
+    assert out[19] == pytest.approx(math.exp(-1), abs=0.02)
+    assert out[99] < 0.01
 
 
 @pytest.mark.parametrize(("towards", "expected"), [((1.0, 0.0), 0.1), ((-1.0, 0.2), -0.1)])
