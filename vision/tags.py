@@ -24,6 +24,7 @@ from vision.rigid import fit_pose
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
+Window = tuple[int, int, int, int]  # left, top, right, bottom, px
 
 CORNERS = np.array([[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]])
 NORMALS = np.array([[0.0, 1.0], [1.0, 0.0], [0.0, -1.0], [-1.0, 0.0]])
@@ -68,21 +69,30 @@ class TagLocaliser:
         cv_compat.dictionary(tag.dictionary)  # an unknown name fails here and not in the loop
 
     def locate(
-        self, image: Image, predicted: Pose | None = None, search_radius_m: float = 0.1
+        self, image_bgr: Image, predicted: Pose | None, search_radius_m: float
     ) -> PoseMeasurement:
-        """Return the pose of the centre of mass seen in a BGR image (H, W, 3).
+        """Return the pose of the centre of mass seen in an image, (H, W, 3) uint8 BGR.
 
-        With `predicted` only the window within `search_radius_m` of it is looked at, and an answer
-        further away is refused; without, the whole frame.
+        With a prediction the search stays in a window of `search_radius_m` around it, and falls
+        back to the whole frame when the tag is not there.
         """
-        window = self._window(image, predicted, search_radius_m)
-        details = {"window": float(predicted is not None)}
-        if window is None:
-            return _not_seen("predicted place lies outside the image", details)
+        height, width = image_bgr.shape[:2]
+        if predicted is not None:
+            window = self._window((width, height), predicted, search_radius_m)
+            if window is not None:
+                found = self._search(image_bgr, window, predicted, search_radius_m)
+                if found.pose is not None:
+                    return found
+        return self._search(image_bgr, (0, 0, width, height), None, 0.0)
+
+    def _search(
+        self, image: Image, window: Window, predicted: Pose | None, radius_m: float
+    ) -> PoseMeasurement:
+        """Return the tag seen in the window; near the prediction if there is one."""
         u0, v0, u1, v1 = window
         level = cv_compat.grey(image[v0:v1, u0:u1])
         ours = self._corners(level) + np.array([u0, v0])
-        details["candidates"] = float(len(ours))
+        details = {"window": float(predicted is not None), "candidates": float(len(ours))}
         if not len(ours):
             return _not_seen(f"tag {self._tag.tag_id} not found", details)
         outlines = [self._outline(level, (u0, v0), four) for four in ours]
@@ -92,7 +102,7 @@ class TagLocaliser:
         if not good:
             whole = [o for o in outlines if o is not None]
             return _not_seen(self._reason(whole[0]) if whole else "outline hidden", details)
-        return self._judge(good, predicted, search_radius_m, details)
+        return self._judge(good, predicted, radius_m, details)
 
     def _corners(self, level: Image) -> Array:
         """Return the corner pixels, (N, 4, 2), of every tag with our number."""
@@ -104,12 +114,9 @@ class TagLocaliser:
         return ours
 
     def _window(
-        self, image: Image, predicted: Pose | None, search_radius_m: float
-    ) -> tuple[int, int, int, int] | None:
-        """Return (u0, v0, u1, v1) of the part to look at, None when it is not in the image."""
-        height, width = image.shape[:2]
-        if predicted is None:
-            return 0, 0, width, height
+        self, size_px: tuple[int, int], predicted: Pose, search_radius_m: float
+    ) -> Window | None:
+        """Return the part to look at, None when the predicted place is not in the image."""
         middle = self._tag_pose(predicted)
         reach = search_radius_m + self._tag.size_m * (0.5 * math.sqrt(2) + self._tag.margin_ratio)
         corners = CORNERS * reach + (middle.x_m, middle.y_m)
@@ -117,7 +124,7 @@ class TagLocaliser:
         if np.isnan(px).any():
             return None
         u0, v0 = np.maximum(np.floor(px.min(axis=0)), 0).astype(int)
-        u1, v1 = np.minimum(np.ceil(px.max(axis=0)) + 1, (width, height)).astype(int)
+        u1, v1 = np.minimum(np.ceil(px.max(axis=0)) + 1, size_px).astype(int)
         return (int(u0), int(v0), int(u1), int(v1)) if u1 - u0 > 8 and v1 - v0 > 8 else None
 
     def _tag_pose(self, body: Pose) -> Pose:

@@ -38,6 +38,23 @@ class LensConfig(Section):
     p1: float = Field(0.0008, ge=-0.1, le=0.1, description="decentring, of the usual size")
     p2: float = Field(-0.0005, ge=-0.1, le=0.1, description="decentring, of the usual size")
     k3: float = Field(0.0, ge=-2.0, le=2.0, description="not needed below 60 deg")
+    shift_degree: int = Field(
+        0, ge=0, le=7, description="of the pixel correction by `hil calibrate floor --correct`"
+    )
+    shift_u: tuple[float, ...] = Field((), description="its terms in half widths, for u")
+    shift_v: tuple[float, ...] = Field((), description="its terms in half widths, for v")
+
+    @model_validator(mode="after")
+    def _check_shift(self) -> LensConfig:
+        """Refuse a correction whose terms do not fit its degree."""
+        degree = self.shift_degree
+        terms = (degree + 1) * (degree + 2) // 2 if degree else 0
+        if not len(self.shift_u) == len(self.shift_v) == terms:
+            raise ValueError(
+                f"shift_u and shift_v have {len(self.shift_u)} and {len(self.shift_v)} terms; a"
+                f" shift_degree of {degree} has {terms}"
+            )
+        return self
 
 
 class CameraPoseConfig(Section):
@@ -247,6 +264,7 @@ class CameraConfig(Section):
         import numpy as np  # noqa: PLC0415
 
         from vision.camera import CameraModel, look_at  # noqa: PLC0415
+        from vision.correction import with_shift  # noqa: PLC0415
 
         lens, pose = self.lens, self.pose
         rotation = (
@@ -265,4 +283,7 @@ class CameraConfig(Section):
             rotation,
             np.array(pose.eye_m),
         )
+        if lens.shift_degree:
+            shift = np.column_stack((lens.shift_u, lens.shift_v))
+            reference = with_shift(reference, lens.shift_degree, shift)
         return reference.scaled(self.width_px, self.height_px)

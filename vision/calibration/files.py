@@ -16,8 +16,10 @@ from pathlib import Path
 from hil.config.camera import CameraConfig
 from hil.config.load import build
 from hil.errors import BadInput
+from vision.calibration.colours import ColourCalibration
+from vision.calibration.floor import FloorCalibration
 from vision.calibration.intrinsics import LensCalibration
-from vision.camera import CameraModel
+from vision.correction import CorrectedCamera
 from vision.cv_compat import write_atomic
 
 Value = int | float | bool | Sequence["Value"]
@@ -123,11 +125,47 @@ def lens_tables(calibration: LensCalibration) -> list[Table]:
     return [Table("", size), Table("lens", {**at_size, **lens}, comments)]
 
 
-def pose_table(camera: CameraModel, comments: Sequence[str]) -> Table:
-    """Return the camera's pose over the floor as a table."""
+def floor_tables(result: FloorCalibration, with_lens: bool) -> list[Table]:
+    """Return the tables of a floor calibration; the lens too where it was fitted or corrected."""
+    camera = result.camera
+    comments = [
+        f"from {len(result.pairs.names)} points; dropped:"
+        f" {', '.join(name for name, _ in result.dropped) or 'none'}",
+        f"residual {result.rms_mm:.2f} mm RMS, on held-out points"
+        f" {result.held_out_rms_mm:.2f} mm RMS",
+    ]
     rotation = [[float(x) for x in row] for row in camera.R_world_cam]
     eye = [float(x) for x in camera.t_world_cam_m]
-    return Table("pose", {"eye_m": eye, "R_world_cam": rotation}, comments)
+    pose = Table("pose", {"eye_m": eye, "R_world_cam": rotation}, comments)
+    if not with_lens and not isinstance(camera, CorrectedCamera):
+        return [pose]
+    size = {"width_px": camera.width_px, "height_px": camera.height_px}
+    numbers = (camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, *camera.dist)
+    lens: dict[str, Value] = {f"at_{key}": value for key, value in size.items()}
+    lens |= dict(zip(LENS_NAMES, numbers, strict=True))
+    if isinstance(camera, CorrectedCamera):
+        lens["shift_degree"] = camera.degree
+        for axis, name in enumerate(("shift_u", "shift_v")):
+            lens[name] = [float(x) for x in camera.shift[:, axis]]
+    how = "fitted to the floor's points" if with_lens else "corrected by the floor's points"
+    return [Table("", size), Table("lens", lens, [how]), pose]
+
+
+def colour_tables(config: CameraConfig, result: ColourCalibration) -> list[Table]:
+    """Return the tables of both marks with the learned colours, their places as they were."""
+    comment = f"learned; separation of the two d' = {result.separation:.1f}"
+    tables = []
+    for name, mark, colour in (
+        ("front", config.marks.front, result.front),
+        ("rear", config.marks.rear, result.rear),
+    ):
+        values: dict[str, Value] = {
+            "colour": [round(c, 4) for c in colour.bgr],
+            "x_m": mark.x_m,
+            "y_m": mark.y_m,
+        }
+        tables.append(Table(f"marks.{name}", values, [comment]))
+    return tables
 
 
 def require_size(config: CameraConfig, size_px: tuple[int, int], camera: str, image: str) -> None:

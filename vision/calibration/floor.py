@@ -15,15 +15,16 @@ from scipy.optimize import least_squares
 
 from hil.errors import BadInput
 from vision import cv_compat
-from vision.calibration.correction import corrected
 from vision.calibration.points import PointPairs
 from vision.camera import CameraModel, distort
+from vision.correction import corrected
 
 Array = NDArray[np.float64]
 
-POINTS_MIN = 4
+# One more than a pose needs, so that each can be held out once.
+POINTS_MIN = 5
 POINTS_MIN_WITH_LENS = 12
-FOLDS_FROM = 16
+HALVES_FROM, HALVES_FROM_WITH_LENS = 16, 30
 SIGMA_HEIGHT_M = 0.003
 # What a lens is like before anything was measured: the spread of ordinary cameras. With many
 # points these say nothing; with few they keep the fit from following the noise.
@@ -274,15 +275,32 @@ def _project(camera: CameraModel, world_m: Array) -> Array:
 def _held_out_mm(pairs: PointPairs, size_px: tuple[int, int], options: FloorOptions) -> Array:
     """Return each point's error under a fit to the other half; few points are left out singly."""
     count = len(pairs.px)
-    if count >= FOLDS_FROM:
+    if count >= (HALVES_FROM if options.lens is not None else HALVES_FROM_WITH_LENS):
         order = np.random.default_rng(0).permutation(count)
         folds = [order[0::2], order[1::2]]
     else:
-        folds = [np.array([k]) for k in range(count)] if count > POINTS_MIN else []
+        folds = [np.array([k]) for k in range(count)]
     errors = np.full(count, np.nan)
     for fold in folds:
         rest = pairs.take(np.setdiff1d(np.arange(count), fold))
-        if options.lens is None and len(rest.px) < POINTS_MIN_WITH_LENS:
-            continue
         errors[fold] = floor_errors_mm(_fit(rest, size_px, options).camera, pairs.take(fold))
     return errors
+
+
+def error_budget(camera: CameraModel, mark_height_m: float) -> dict[str, float]:
+    """Return what 0.1 px and 3 mm of mark height cost on the floor, in mm.
+
+    Once for the middle of the image and once for its worst corner that sees the floor.
+    """
+    right, bottom = camera.width_px - 1.0, camera.height_px - 1.0
+    corners = [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)]
+    budget = {"height_m": mark_height_m}
+    places = {"centre": [(0.5 * right, 0.5 * bottom)], "corner": corners}
+    for name, pixels in places.items():
+        # A corner above the horizon sees no floor and has no error there.
+        jacobians = [camera.floor_jacobian(u, v, mark_height_m) for u, v in pixels]
+        slopes = [float(np.linalg.norm(j, 2)) for j in jacobians if np.isfinite(j).all()]
+        leans = [float(np.hypot(*camera.lean(u, v))) for u, v in pixels]
+        budget[f"pixel_{name}_mm"] = max(slopes, default=0.0) * 0.1e3
+        budget[f"height_{name}_mm"] = max((x for x in leans if np.isfinite(x)), default=0.0) * 3.0
+    return budget

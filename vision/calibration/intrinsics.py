@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,7 @@ class LensCalibration:
 
     `lens` is (fx, fy, cx, cy, k1, k2, p1, p2, k3) and `sigma` its standard deviations. `held_out_px`
     is the RMS residual over views the lens was not fitted to, their pose being solved anew.
+    `corners_px` and `residuals_px` (seen minus projected) are (N, 2), over all views kept.
     """
 
     width_px: int
@@ -55,6 +56,8 @@ class LensCalibration:
     coverage_ratio: float
     views: tuple[ViewResult, ...]
     advice: tuple[str, ...]
+    corners_px: Array
+    residuals_px: Array
 
     def model(self) -> CameraModel:
         """Return the lens as a camera at the world's origin that looks along world z."""
@@ -103,6 +106,8 @@ def calibrate_lens(views: Sequence[BoardView], size_px: tuple[int, int]) -> Lens
         float(np.mean(covered > 0)),
         tuple(results),
         tuple(advise(covered, tilts)),
+        np.vstack([view.px for view in kept]),
+        np.vstack([residuals(v, lens, place) for v, place in zip(kept, places, strict=True)]),
     )
 
 
@@ -169,6 +174,18 @@ def _tilt_deg(place: Array) -> float:
     return float(np.degrees(np.arccos(min(1.0, abs(cv_compat.rotation(place[:3])[2, 2])))))
 
 
+def slant_deg(view: BoardView) -> float:
+    """Return roughly the tilt of a board before any lens is known.
+
+    A tilted board is foreshortened: the cosine of the tilt is the ratio of the extents of the best
+    affine map from board to image.
+    """
+    board = view.board_m[:, :2] - view.board_m[:, :2].mean(axis=0)
+    affine = np.linalg.lstsq(board, view.px - view.px.mean(axis=0), rcond=None)[0]
+    long, short = np.linalg.svd(affine, compute_uv=False)
+    return float(np.degrees(np.arccos(min(1.0, short / long))))
+
+
 def _rms(errors: Array, views: Sequence[BoardView]) -> float:
     """Return the RMS over all corners of per-view RMS errors."""
     weights = np.array([len(view.px) for view in views], dtype=np.float64)
@@ -204,8 +221,3 @@ def advise(covered: NDArray[np.int64], tilts_deg: Sequence[float]) -> list[str]:
     if len(tilts_deg) < 10:
         advice.append(f"take {10 - len(tilts_deg)} more views (10 make the error figures stable)")
     return advice
-
-
-def renamed(view: BoardView, name: str) -> BoardView:
-    """Return the view under another name."""
-    return replace(view, name=name)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,12 +13,11 @@ from numpy.typing import NDArray
 from hil.errors import BadInput
 from vision import cv_compat
 from vision.calibration.boards import Board, BoardView, Chessboard
+from vision.calibration.tables import read_numbers
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 Place = tuple[float, float, float]  # x_m, y_m, theta_rad of a board's origin on the floor
-
-UNITS = {"_mm": 1e-3, "_m": 1.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,64 +41,9 @@ class PointPairs:
         return PointPairs(names, world, np.vstack([part.px for part in parts]))
 
 
-def read_table(
-    path: Path, needed: Sequence[str], optional: Sequence[str]
-) -> list[dict[str, float]]:
-    """Return the rows of a CSV as numbers, lengths in m whether columns end in _m or _mm.
-
-    Columns may stand in any order and be separated by commas or semicolons; raises BadInput with
-    the line at fault.
-    """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(f"{path}: cannot be read: {error}") from None
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    separator = ";" if lines and ";" in lines[0] else ","
-    reader = csv.reader(lines, delimiter=separator)
-    header = [name.strip() for name in next(reader, [])]
-    columns = {name: _find_column(header, name) for name in (*needed, *optional)}
-    missing = [name for name in needed if columns[name] is None]
-    if missing:
-        raise BadInput(
-            f"{path}: column {missing[0]} is missing; the first line must name"
-            f" {', '.join(needed)} (lengths may end in _mm instead)"
-        )
-    rows = []
-    for number, cells in enumerate(reader, 2):
-        row = {}
-        for name, column in columns.items():
-            if column is None:
-                continue
-            row[name] = _number(path, number, name, cells, column)
-        rows.append(row)
-    return rows
-
-
-def _find_column(header: list[str], name: str) -> tuple[int, float] | None:
-    """Return the place of a column and the factor to SI, None when it is not there."""
-    if name in header:
-        return header.index(name), 1.0
-    if name.endswith("_m") and f"{name}m" in header:
-        return header.index(f"{name}m"), UNITS["_mm"]
-    return None
-
-
-def _number(path: Path, line: int, name: str, cells: list[str], column: tuple[int, float]) -> float:
-    index, factor = column
-    text = cells[index].strip() if index < len(cells) else ""
-    try:
-        value = float(text) * factor
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise BadInput(f"{path}: data line {line}, {name} = {text!r}: not a number")
-    return value
-
-
 def read_pairs(path: Path) -> PointPairs:
     """Return the pairs of a CSV with columns x_m, y_m, u_px, v_px and, if wanted, z_m."""
-    rows = read_table(path, ("x_m", "y_m", "u_px", "v_px"), ("z_m",))
+    rows = read_numbers(path, ("x_m", "y_m", "u_px", "v_px"), ("z_m",))
     if not rows:
         raise BadInput(f"{path}: no points in it")
     world = np.array([(row["x_m"], row["y_m"], row.get("z_m", 0.0)) for row in rows])
@@ -126,7 +69,7 @@ def pairs_of_board(board: Board, view: BoardView, place: Place) -> PointPairs:
 
 def pairs_of_fiducials(image: Image, name: str, table: Path, dictionary: str) -> PointPairs:
     """Return the centres of tags seen, by a CSV with columns id, x_m, y_m and, if wanted, z_m."""
-    rows = read_table(table, ("id", "x_m", "y_m"), ("z_m",))
+    rows = read_numbers(table, ("id", "x_m", "y_m"), ("z_m",))
     places = {int(row["id"]): (row["x_m"], row["y_m"], row.get("z_m", 0.0)) for row in rows}
     found, corners = cv_compat.detect_tags(cv_compat.tag_detector(dictionary), image)
     seen = {int(number): centre_of_tag(c) for number, c in zip(found, corners, strict=True)}

@@ -91,5 +91,10 @@ def corrected(camera: CameraModel, world_m: Array, px: Array, degree: int) -> Co
         )
     wanted = (camera.project(world_m) - px) / (0.5 * camera.width_px)
     shift: Array = np.linalg.lstsq(terms, wanted, rcond=None)[0].astype(np.float64)
+    return with_shift(camera, degree, shift)
+
+
+def with_shift(camera: CameraModel, degree: int, shift: Array) -> CorrectedCamera:
+    """Return the camera with a known shift, (T, 2) in half widths."""
     own = {f.name: getattr(camera, f.name) for f in fields(CameraModel) if f.init}
     return CorrectedCamera(**own, degree=degree, shift=shift)

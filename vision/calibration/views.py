@@ -1,0 +1,159 @@
+"""Board views gathered from a folder, a video or a live camera."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.errors import BadInput
+from vision import cv_compat
+from vision.calibration.boards import Board, BoardView
+from vision.calibration.intrinsics import advise, coverage, slant_deg
+from vision.sources import ImageFolder, LiveCamera, VideoFile
+
+Image = NDArray[np.uint8]
+Report = Callable[[str], None]
+
+# A video is looked at this often; a hand needs about so long to bring the board elsewhere.
+LOOKS_PER_S = 5.0
+STILL_RATIO = 0.004
+NEW_PLACE_RATIO = 0.06
+NEW_CELLS = 2
+
+
+@dataclass(slots=True)
+class Views:
+    """Views of one board at one image size; `missed` names images in which it was not seen."""
+
+    size_px: tuple[int, int]
+    views: list[BoardView] = field(default_factory=list)
+    missed: list[str] = field(default_factory=list)
+
+
+def views_of_folder(board: Board, folder: Path, report: Report) -> Views:
+    """Return a view of every image of the folder that shows the board; raises BadInput."""
+    source = ImageFolder(folder)
+    found = Views((source.width_px, source.height_px))
+    for frame in source.frames():
+        name = source.files[frame.index].name
+        assert frame.image is not None
+        view = board.find(frame.image, name)
+        report(f"{name}: {'board not seen' if view is None else f'{len(view.px)} corners'}")
+        if view is None:
+            found.missed.append(name)
+        else:
+            found.views.append(view)
+    return _require_views(found, f"{len(source.files)} images of {folder}")
+
+
+def views_of_video(board: Board, path: Path, report: Report) -> Views:
+    """Return views of a video taken while the board is held still in new places."""
+    source = VideoFile(path)
+    found = Views((source.width_px, source.height_px))
+    picker = Picker(found.size_px)
+    every = max(1, round(source.rate_hz / LOOKS_PER_S))
+    looked = 0
+    for frame in source.frames():
+        if frame.index % every:
+            continue
+        assert frame.image is not None
+        looked += 1
+        name = f"frame {frame.index} at {frame.t_cam_s:.2f} s"
+        view = picker.offer(board.find(frame.image, name))
+        if view is not None:
+            found.views.append(view)
+            report(f"{name}: view {len(found.views)}, {len(view.px)} corners")
+    source.close()
+    return _require_views(found, f"{looked} frames looked at of {path}")
+
+
+def views_of_camera(board: Board, camera: LiveCamera, wanted: int, report: Report) -> Views:
+    """Return views from a live camera, saying what to show next, until `wanted` are taken."""
+    found = Views((camera.width_px, camera.height_px))
+    picker = Picker(found.size_px)
+    next_look_s = -math.inf
+    while len(found.views) < wanted:
+        frame = camera.read()
+        if frame.t_cam_s < next_look_s:
+            continue
+        next_look_s = frame.t_cam_s + 1.0 / LOOKS_PER_S
+        assert frame.image is not None
+        view = picker.offer(board.find(frame.image, f"view {len(found.views) + 1}"))
+        if view is not None:
+            found.views.append(view)
+            cells = coverage([v.px for v in found.views], found.size_px)
+            hints = advise(cells, [slant_deg(v) for v in found.views])
+            report(f"{view.name} of {wanted}: {hints[0] if hints else 'enough; more steady it'}")
+    return found
+
+
+def _require_views(found: Views, where: str) -> Views:
+    if not found.views:
+        raise BadInput(f"board not seen in any of {where}; is it the board described?")
+    return found
+
+
+class Picker:
+    """Takes views that are still and show the board in a new place or new cells of the image."""
+
+    def __init__(self, size_px: tuple[int, int]) -> None:
+        self._size_px = size_px
+        self._previous: BoardView | None = None
+        self._taken: list[BoardView] = []
+
+    def offer(self, view: BoardView | None) -> BoardView | None:
+        """Return the view if it is worth keeping, None otherwise; offered in order of time."""
+        previous, self._previous = self._previous, view
+        if view is None or previous is None:
+            return None
+        width_px = self._size_px[0]
+        if _distance_px(view, previous) > STILL_RATIO * width_px or not self._is_new(view):
+            return None
+        self._taken.append(view)
+        return view
+
+    def _is_new(self, view: BoardView) -> bool:
+        if all(_distance_px(view, t) > NEW_PLACE_RATIO * self._size_px[0] for t in self._taken):
+            return True
+        before = coverage([t.px for t in self._taken], self._size_px) > 0
+        now = coverage([view.px], self._size_px) > 0
+        return int(np.sum(now & ~before)) >= NEW_CELLS
+
+
+def _distance_px(a: BoardView, b: BoardView) -> float:
+    """Return the RMS distance of the corners both views show, infinite without common ones."""
+    places = {tuple(p): px for p, px in zip(a.board_m.round(6).tolist(), a.px, strict=True)}
+    pairs = [
+        px - places[tuple(p)]
+        for p, px in zip(b.board_m.round(6).tolist(), b.px, strict=True)
+        if tuple(p) in places
+    ]
+    return float(np.sqrt(np.mean(np.sum(np.square(pairs), axis=1)))) if pairs else float("inf")
+
+
+def floor_images(source: Path) -> Iterator[tuple[str, Image]]:
+    """Yield (name, image) of an image file, a folder, or the first frame of a video."""
+    if source.is_dir():
+        folder = ImageFolder(source)
+        frames: Iterable[tuple[str, Image | None]] = (
+            (folder.files[frame.index].name, frame.image) for frame in folder.frames()
+        )
+    elif source.suffix.lower() in cv_compat.IMAGE_SUFFIXES or not source.exists():
+        frames = [(source.name, cv_compat.read_image(source))]
+    else:
+        video = VideoFile(source)
+        frames = [(source.name, next(video.frames()).image)]
+        video.close()
+    for name, image in frames:
+        assert image is not None
+        yield name, image
+
+
+def blank_image(size_px: tuple[int, int]) -> Image:
+    """Return a grey image to draw on where there is no photograph."""
+    return np.full((size_px[1], size_px[0], 3), 96, dtype=np.uint8)
