@@ -8,7 +8,6 @@ has its index at the end, which is why rows go here first and become Parquet whe
 from __future__ import annotations
 
 import json
-import os
 import struct
 from collections.abc import Sequence
 from pathlib import Path
@@ -83,10 +82,7 @@ def write_parquet(path: Path, columns: Columns, schema: Sequence[Column]) -> Non
         arrays.append(array)
     table = pa.Table.from_arrays(arrays, schema=pa.schema(fields))
     part = path.with_name(f"{path.name}.part")
-    with part.open("wb") as file:
-        pq.write_table(table, file, compression="zstd", use_dictionary=False)
-        file.flush()
-        os.fsync(file.fileno())
+    pq.write_table(table, part, compression="zstd", use_dictionary=False)
     part.replace(path)
 
 

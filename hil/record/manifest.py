@@ -58,7 +58,9 @@ class Manifest(BaseModel):
     parameter_hash: str = ""
     firmware_build_id: str = ""
     start_time_utc: str = ""
-    start_unix_us: int = Field(0, description="wall time of t_s = 0; time base of link.tlog")
+    start_unix_us: int = Field(
+        0, description="wall time of opening; stands for t_s = 0 in link.tlog"
+    )
     tick_count: int = 0
     link: dict[str, float] = Field(default_factory=dict, description="counters of the host link")
     files: dict[str, FileEntry] = Field(default_factory=dict)
@@ -69,10 +71,10 @@ class Manifest(BaseModel):
         return str(self.scenario.get("name", ""))
 
 
-def write_manifest(folder: Path, manifest: Manifest) -> None:
+def write_manifest(folder: Path, manifest: Manifest, *, durable: bool = False) -> None:
     """Write the manifest atomically: a reader sees the old one or the new one, whole."""
-    text = json.dumps(manifest.model_dump(mode="json"), indent=1, ensure_ascii=False)
-    replace_file(folder / layout.MANIFEST, text.encode() + b"\n")
+    text = manifest.model_dump_json(indent=1)
+    replace_file(folder / layout.MANIFEST, text.encode() + b"\n", durable=durable)
 
 
 def read_manifest(folder: Path) -> Manifest:
@@ -102,13 +104,18 @@ def read_manifest(folder: Path) -> Manifest:
         raise BadInput(f"{path}: damaged: {key}: {first['msg'].lower()}") from None
 
 
-def replace_file(path: Path, data: bytes) -> None:
-    """Put `data` at `path` in one step, so that no reader and no crash sees half of it."""
+def replace_file(path: Path, data: bytes, *, durable: bool = False) -> None:
+    """Put `data` at `path` in one step, so that no reader and no crash sees half of it.
+
+    With `durable` it has also reached the disk when this returns, and survives a loss of power.
+    That takes milliseconds, so a record asks for it once, at its very end.
+    """
     part = path.with_name(f"{path.name}.part")
     with part.open("wb") as file:
         file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
+        if durable:
+            file.flush()
+            os.fsync(file.fileno())
     part.replace(path)
 
 

@@ -159,9 +159,9 @@ class Recorder:
 
     def _write_figures(self, run: RunRecord) -> None:
         figures = run.figures()
-        verdicts = [verdict.to_json() for verdict in run.verdicts()]
-        text = json.dumps(figures.to_json() | {"requirements": verdicts}, indent=1)
-        replace_file(self.path / layout.FIGURES, text.encode() + b"\n")
+        verdicts = metrics.check(figures, run.manifest.scenario)
+        tree = figures.to_json() | {"requirements": [verdict.to_json() for verdict in verdicts]}
+        replace_file(self.path / layout.FIGURES, json.dumps(tree, indent=1).encode() + b"\n")
 
     def _seal(self, run: RunRecord) -> RunRecord:
         """Write the final manifest with size and SHA-256 of every file."""
@@ -171,5 +171,5 @@ class Recorder:
             if file.is_file() and file.name != layout.MANIFEST
         }
         manifest = run.manifest.model_copy(update={"files": files})
-        write_manifest(self.path, manifest)
+        write_manifest(self.path, manifest, durable=True)
         return dataclasses.replace(run, manifest=manifest)

@@ -7,7 +7,6 @@ of the built-in robot, condition and scenario files. Neither is written down a s
 from __future__ import annotations
 
 import re
-import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,12 +14,14 @@ from importlib.resources import files
 from typing import Any
 
 from pydantic import BaseModel
+from pydantic_core import PydanticUndefined
 
 from hil.config.load import unit_of
 from hil.config.scenario import Scenario
 
 _LINE = re.compile(r'^"?(?P<key>[\w.]+)"?\s*=\s*(?P<value>[^#]*?)\s*(?:#\s*(?P<note>.*))?$')
 _TABLE = re.compile(r"^\[(?P<table>[\w.]+)\]")
+_UNIT_FIRST = re.compile(r"^[^;:,]{1,12}; ")
 # Kept out of the table: the runs' subject, shown elsewhere, and gain sets that are not in use.
 _ELSEWHERE = ("name", "description", "requirements", "manoeuvre", "control.gains", "control.outer")
 
@@ -46,7 +47,7 @@ def assumptions(scenario: Mapping[str, Any]) -> list[tuple[str, list[Assumption]
         top = key.split(".")[0] if "." in key else "run"
         text = f"{value:g}" if isinstance(value, float) else str(value)
         item = Assumption(
-            key, text, unit_of(key.split(".")[-1]), _meaning(key), sources.get(key, "")
+            key, text, unit_of(key.split(".")[-1]), _meaning(key, scenario), sources.get(key, "")
         )
         groups.setdefault(top, []).append(item)
     return list(groups.items())
@@ -64,31 +65,41 @@ def _leaves(tree: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
         yield prefix, tree
 
 
-def _meaning(key: str) -> str:
+def _meaning(key: str, scenario: Mapping[str, Any]) -> str:
     """Return the description of the value's field in the scenario's model, "" if it has none."""
     model: type[BaseModel] | None = Scenario
+    node: Any = scenario
     parts = key.split(".")
     for depth, part in enumerate(parts):
         if part.isdigit():
+            node = node[int(part)]
             continue
         field = model.model_fields.get(part) if model is not None else None
         if field is None:
             return ""
         if depth == len(parts) - 1:
             return field.description or ""
-        model = _section_in(field.annotation)
+        node = node[part]
+        sections = _sections_in(field.annotation)
+        model = next((one for one in sections if _is_kind(one, node)), None)
     return ""
 
 
-def _section_in(annotation: Any) -> type[BaseModel] | None:
-    """Return the section class in an annotation; None when there is none or more than one."""
+def _is_kind(section: type[BaseModel], node: Any) -> bool:
+    """Say whether a table belongs to a section: of a union, the one of its `kind`."""
+    kind = node.get("kind") if isinstance(node, Mapping) else None
+    field = section.model_fields.get("kind")
+    return kind is None or field is None or field.default in {kind, PydanticUndefined}
+
+
+def _sections_in(annotation: Any) -> list[type[BaseModel]]:
+    """Return the section classes in an annotation, looking through unions and lists."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    if typing.get_origin(annotation) in {typing.Union, types.UnionType, typing.Annotated, tuple}:
-        found = [_section_in(argument) for argument in typing.get_args(annotation)]
-        sections = [section for section in found if section is not None]
-        return sections[0] if len(sections) == 1 else None
-    return None
+        return [annotation]
+    found: list[type[BaseModel]] = []
+    for argument in typing.get_args(annotation):
+        found += _sections_in(argument)
+    return found
 
 
 def _sources(scenario_name: str) -> dict[str, str]:
@@ -109,5 +120,6 @@ def _comments(text: str, prefix: str) -> dict[str, str]:
         if header := _TABLE.match(line):
             table = f"{header['table']}."
         elif (entry := _LINE.match(line)) and entry["note"]:
-            found[f"{prefix}{table}{entry['key']}"] = entry["note"]
+            # A comment begins with the unit, which the table of the report shows by itself.
+            found[f"{prefix}{table}{entry['key']}"] = _UNIT_FIRST.sub("", entry["note"])
     return found

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from hil.errors import BadInput
-from hil.metrics import BY_NAME, METRICS, Figures, Metric, Verdict
+from hil.metrics import BY_NAME, METRICS, Figures, Metric, Verdict, check
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -71,13 +71,15 @@ def compare_runs(runs: Sequence[RunRecord]) -> Comparison:
         raise BadInput(f"compare: {len(runs)} run given, at least 2 are needed")
     for run in runs[1:]:
         _refuse_other_task(runs[0], run)
-    entries = tuple(
-        Entry(label, run, run.figures(), run.verdicts())
-        for label, run in zip(labels(runs), runs, strict=True)
-    )
+    entries = tuple(_entry(label, run) for label, run in zip(labels(runs), runs, strict=True))
     first = runs[0].manifest
     description = str(first.scenario.get("description", ""))
     return Comparison(first.scenario_name, description, entries, tuple(_warnings(entries)))
+
+
+def _entry(label: str, run: RunRecord) -> Entry:
+    figures = run.figures()
+    return Entry(label, run, figures, check(figures, run.manifest.scenario))
 
 
 def _refuse_other_task(first: RunRecord, other: RunRecord) -> None:

@@ -37,6 +37,7 @@ _VARIABLES = {_INK: "var(--ink)", _FAINT: "var(--grid)"} | {
 }
 _LAW_COLOURS = {"pid": 0, "asg-ism": 1}
 _WIDTH_IN = 7.4
+_NEAR_MM = 40.0
 _MAX_POINTS = 600  # a wider line has more points than a screen has dots
 _DIGITS = re.compile(r"(\.\d\d)\d+")  # a hundredth of a point is finer than any screen
 _STYLE: dict[Any, Any] = {
@@ -155,25 +156,42 @@ def _thin(*columns: Array) -> list[Array]:
     return [column[keep] for column in columns]
 
 
-def path_figure(runs: Sequence[Trace], name: str) -> str:
-    """Draw the way on the floor (figures 8.10, 8.14, 8.18); start, heading and target marked."""
-    sheet = Sheet(1, 3.6)
-    axes = sheet.axes[0]
+def path_figure(runs: Sequence[Trace], name: str, limit_m: float | None) -> str:
+    """Draw the way on the floor (figures 8.10, 8.14, 8.18) and, enlarged, delta1 near its target."""
+    sheet = Sheet(2, 3.4)
+    floor, near = sheet.axes
     for run in runs:
         who = "true" if metrics.has_truth(run.samples) else "est"
         x_m, y_m = _thin(run.samples[f"{who}_x_m"], run.samples[f"{who}_y_m"])
-        axes.plot(x_m, y_m, color=run.paint, label=run.label)
-        axes.plot(x_m[-1], y_m[-1], "o", ms=5, color=run.paint)
+        floor.plot(x_m, y_m, color=run.paint, label=run.label)
+        error_x, error_y = (part * 1e3 for part in metrics.error_components(run.samples))
+        near.plot(error_x, error_y, color=run.paint)
+        for axes, x, y in ((floor, x_m, y_m), (near, error_x, error_y)):
+            axes.plot(x[-1], y[-1], "o", ms=5, color=run.paint)
     first = runs[0].samples
     reference = _thin(first["ref_z1_x_m"], first["ref_z1_y_m"])
-    axes.plot(*reference, "--", color=_INK, lw=0.8)
-    axes.plot(
-        reference[0][-1], reference[1][-1], "+", ms=11, mew=1.4, color=_INK, label="target z1*"
+    floor.plot(*reference, "--", color=_INK, lw=0.8)
+    floor.plot(
+        *(part[-1] for part in reference), "+", ms=11, mew=1.4, color=_INK, label="target z1*"
     )
-    _draw_start(axes, first)
-    axes.set_aspect("equal", adjustable="datalim")
+    near.plot(0.0, 0.0, "+", ms=11, mew=1.4, color=_INK)
+    _draw_start(floor, first)
+    floor.set_aspect("equal", adjustable="datalim")
+    _draw_limit(near, limit_m)
     sheet.label(0, "Y in m", "X in m")
+    sheet.label(1, "δ1,Y in mm", "δ1,X in mm")
     return sheet.svg(name)
+
+
+def _draw_limit(near: Axes, limit_m: float | None) -> None:
+    """Show the plane of delta1 around the target, with the circle that the limit allows."""
+    if limit_m is not None:
+        turn = np.linspace(0.0, 2.0 * np.pi, 90)
+        radius_mm = limit_m * 1e3
+        near.plot(radius_mm * np.cos(turn), radius_mm * np.sin(turn), ":", color=_INK, lw=0.8)
+    near.set_aspect("equal", adjustable="box")
+    near.set_xlim(-_NEAR_MM, _NEAR_MM)
+    near.set_ylim(-_NEAR_MM, _NEAR_MM)
 
 
 def _draw_start(axes: Axes, samples: Columns) -> None:

@@ -207,9 +207,11 @@ def _figures(comparison: Comparison) -> list[Context]:
     ]
     limit_m = limits[0] if limits else None
     drawn = [
-        (draw.path_figure(runs, f"{anchor}-path"), f"Path on the floor{_after(path)}",
-         "Centre of mass in the X-Y plane, seen from above; a dot ends each path, the arrow is "
-         "10 cm along the heading at the start."),
+        (draw.path_figure(runs, f"{anchor}-path", limit_m), f"Path on the floor{_after(path)}",
+         "Left: centre of mass in the X-Y plane, seen from above; the arrow is 10 cm along the "
+         "heading at the start. Right: the flat output z1, which the laws steer and which lies d0 "
+         "ahead of the centre of mass, enlarged around its target; the dotted circle is the limit "
+         "on |δ1|. A dot ends each path."),
         (draw.error_figure(runs, f"{anchor}-error", limit_m), f"Error per component{_after(error)}",
          "|z1 - z1*|, logarithmic; the dotted line is the limit that the scenario sets on |δ1| "
          "over the last second."),
