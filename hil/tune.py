@@ -1,7 +1,7 @@
 """The gain procedure: one search, one cost and one budget for both outer laws (docs/control.md).
 
 The caller says how a candidate is run (`evaluate`), so the procedure works on any target. Gains are
-searched on a logarithmic scale by CMA-ES; every candidate of both laws sees the same scenarios and
+searched on a logarithmic scale by CMA-ES; every candidate of both laws sees the same cases and
 the same seeds, and both laws get the same population and the same number of candidates.
 """
 
@@ -10,15 +10,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from hil.config.control import Gains
+from hil.config.events import Disturbance
+from hil.config.load import load_scenario
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from hil.config.scenario import Scenario
 
 Figures = Mapping[str, float]
-# (outer law, gains, scenario, seed) -> figures of the run, named as in metrics.json
+# (outer law, gains, case, seed) -> figures of the run, named as in metrics.json
 Evaluate = Callable[[str, Gains, str, int], Figures]
 # (outer law, candidates done, candidates in all, best cost so far)
 Progress = Callable[[str, int, int, float], None]
@@ -50,12 +54,30 @@ SEARCH: dict[str, dict[str, tuple[float, float, float]]] = {
 }
 
 
+# What pushes the robot in a case named "<scenario>/pushed": a tenth of the robot's weight along its
+# way and a twist of the same order about the vertical, at rates inside the loop's bandwidth.
+PUSHES = (
+    Disturbance(target="force_forward_n", shape="sine", amplitude=3.0, frequency_hz=0.4),
+    Disturbance(
+        target="torque_yaw_n_m", shape="sine", amplitude=0.15, frequency_hz=0.3, phase_rad=1.0
+    ),
+)
+CASES = (
+    "scenario-1",
+    "scenario-2",
+    "scenario-3",
+    "scenario-1/pushed",
+    "scenario-2/pushed",
+    "scenario-3/pushed",
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Plan:
     """What both laws are given alike."""
 
-    scenarios: tuple[str, ...]
-    seeds: tuple[int, ...]
+    cases: tuple[str, ...] = CASES
+    seeds: tuple[int, ...] = (1,)
     candidates: int = 300
     population: int = 10
     search_seed: int = 1
@@ -78,11 +100,9 @@ def run_cost(figures: Figures) -> float:
 
 
 def candidate_cost(outer: str, gains: Gains, evaluate: Evaluate, plan: Plan) -> float:
-    """Return the mean cost over every scenario and seed of the plan."""
+    """Return the mean cost over every case and seed of the plan."""
     costs = [
-        run_cost(evaluate(outer, gains, scenario, seed))
-        for scenario in plan.scenarios
-        for seed in plan.seeds
+        run_cost(evaluate(outer, gains, case, seed)) for case in plan.cases for seed in plan.seeds
     ]
     return sum(costs) / len(costs)
 
@@ -154,7 +174,7 @@ def tune(
         "procedure": "hil.tune: CMA-ES on log gains, see docs/control.md",
         "target": target,
         "revision": revision,
-        "scenarios": ", ".join(plan.scenarios),
+        "cases": ", ".join(plan.cases),
         "seeds": ", ".join(map(str, plan.seeds)),
         "population": plan.population,
         "search_seed": plan.search_seed,
@@ -178,3 +198,35 @@ def write_gain_set(path: Path, gains: Gains) -> None:
             for key, value in values.items()
         ]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def case_scenario(case: str, gains: Gains) -> Scenario:
+    """Return the scenario of a case with `gains` as its tuned set."""
+    name, _, variant = case.partition("/")
+    scenario = load_scenario(name)
+    sets = scenario.control.gains.model_copy(update={"tuned": gains})
+    control = scenario.control.model_copy(update={"gains": sets, "gain_set": "tuned"})
+    pushes = PUSHES if variant == "pushed" else scenario.disturbances
+    return scenario.model_copy(update={"control": control, "disturbances": pushes})
+
+
+def evaluate_on(target: str, camera: str, inner: str) -> Evaluate:
+    """Return an `evaluate` that runs the case on a target; a run that ends early has no figures."""
+    from hil.run import RunSpec, execute  # noqa: PLC0415 - the search itself needs no target
+
+    def evaluate(outer: str, gains: Gains, case: str, seed: int) -> Figures:
+        with TemporaryDirectory(prefix="hil-tune-") as folder:
+            spec = RunSpec(
+                scenario=case_scenario(case, gains),
+                target=target,
+                camera=camera,
+                outer=outer,
+                inner=inner,
+                seed=seed,
+                out=Path(folder) / "run",
+                rerun=False,
+            )
+            record = execute(spec)
+            return record.figures().values if record.manifest.outcome == "complete" else {}
+
+    return evaluate

@@ -4,37 +4,40 @@ import math
 
 import pytest
 import sympy as sp
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hil.config.control import OuterLimits
 from hil.laws.chain import Chain, damped_inverse, restrict
 from tests.laws.support import D0_M, estimate
 
+# cos and sin of theta are symbols with their own rates, so that everything is a polynomial.
+c, s = sp.symbols("c s")
+eta1, eta2, zeta, v1, u2 = sp.symbols("eta1 eta2 zeta v1 u2")
+d0, m, inertia = sp.symbols("d0 m I", positive=True)
+xi, xi_dot = sp.symbols("xi1:4"), sp.symbols("xi_dot1:4")
 
-def symbols_and_third_derivative():
-    """Return the symbols and d3z/dt3 of z = [X + d0 cos, Y + d0 sin] along (2.30), (2.34)."""
-    d0, v1, u2 = sp.symbols("d0 v1 u2", positive=True)
-    X, Y, theta, eta1, eta2, zeta = sp.symbols("X Y theta eta1 eta2 zeta")
-    c, s = sp.cos(theta), sp.sin(theta)
-    rates = {
-        X: c * eta1 - s * eta2,
-        Y: s * eta1 + c * eta2,
-        theta: -eta2 / d0,
-        eta1: zeta,
-        eta2: u2,
-        zeta: v1,
-    }
-    z = sp.Matrix([X + d0 * c, Y + d0 * s])
-    for _ in range(3):
+
+def third_derivative(d1=0, d2=0):
+    """Return d3z/dt3 of z = [X + d0 c, Y + d0 s] along (2.30), (2.34) with d1, d2 in eta_dot."""
+    w = -eta2 / d0
+    rates = {c: -s * w, s: c * w, eta1: zeta + d1, eta2: u2 + d2, zeta: v1}
+    rates |= dict(zip(xi, xi_dot, strict=True))
+    z_dot = sp.Matrix([c * eta1 - s * eta2, s * eta1 + c * eta2]) + d0 * sp.Matrix([-s, c]) * w
+    z = z_dot
+    for _ in range(2):
         z = z.jacobian(list(rates)) * sp.Matrix(list(rates.values()))
-    return (theta, eta1, eta2, zeta, d0, v1, u2), sp.simplify(z)
+    return z
 
 
-def closed_form(symbols, second_row_sign):
-    """Return A + B v; second_row_sign -1 is control.md section 1, +1 is as printed in (2.35) ff."""
-    theta, eta1, eta2, zeta, d0, v1, u2 = symbols
-    c, s = sp.cos(theta), sp.sin(theta)
+def is_zero(expression):
+    """Whether an expression vanishes under c^2 + s^2 = 1."""
+    numerator = sp.expand(sp.numer(sp.together(expression)))
+    return sp.expand(sp.rem(numerator, s**2 + c**2 - 1, s)) == 0
+
+
+def closed_form(second_row_sign):
+    """Return A + B v and B; -1 is control.md section 1, +1 is as printed after (2.35)."""
     A = -sp.Matrix([c, s]) * eta1 * eta2**2 / d0**2
     A += sp.Matrix([s, second_row_sign * c]) * 2 * zeta * eta2 / d0
     B = sp.Matrix([[c, eta1 * s / d0], [s, second_row_sign * eta1 * c / d0]])
@@ -43,51 +46,71 @@ def closed_form(symbols, second_row_sign):
 
 def test_closed_form_of_a_and_b_is_the_third_derivative_of_the_flat_output():
     """A + B v of control.md equals d3z/dt3 symbolically, and det B = -eta1/d0."""
-    symbols, third = symbols_and_third_derivative()
-    ours, B = closed_form(symbols, -1)
-    assert sp.simplify(third - ours) == sp.zeros(2, 1)
-    assert sp.simplify(B.det() + symbols[1] / symbols[4]) == 0
+    ours, B = closed_form(-1)
+    assert all(is_zero(entry) for entry in third_derivative() - ours)
+    assert is_zero(B.det() + eta1 / d0)
 
 
 def test_printed_a_and_b_are_not_the_third_derivative():
     """The printed signs differ, and the printed B is singular at 45 degrees at any speed."""
-    symbols, third = symbols_and_third_derivative()
-    printed, B = closed_form(symbols, +1)
-    assert sp.simplify(third - printed) != sp.zeros(2, 1)
-    assert sp.simplify(B.det().subs(symbols[0], sp.pi / 4)) == 0
+    printed, B = closed_form(+1)
+    assert not all(is_zero(entry) for entry in third_derivative() - printed)
+    assert sp.simplify(B.det().subs({c: sp.sqrt(2) / 2, s: sp.sqrt(2) / 2})) == 0
 
 
+def test_disturbance_matrices_of_the_third_derivative():
+    """P xi + G xi_dot of (8.14), that is C xi + D xi_dot of (2.36), as corrected in docs/control.md.
+
+    Against the print: the terms in 1/m of C all carry eta2/d0, C13 has a +, D a -.
+    """
+    d1 = -(c * xi[0] + s * xi[1]) / m
+    d2 = -(-s * xi[0] + c * xi[1] - xi[2] / d0) / (m + inertia / d0**2)
+    rest = third_derivative(d1, d2) - third_derivative()
+    k, q = eta1 / (m * d0**2 + inertia), eta2 / (d0 * m)
+    C = sp.Matrix(
+        [
+            [k * d0 * s**2 - 3 * q * c * s, -k * d0 * c * s + q * (c**2 - 2 * s**2), k * s],
+            [-k * d0 * s * c + q * (2 * c**2 - s**2), k * d0 * c**2 + 3 * q * s * c, -k * c],
+        ]
+    )
+    D = -sp.Matrix([[c**2, s * c, 0], [s * c, s**2, 0]]) / m
+    ours = C * sp.Matrix(xi) + D * sp.Matrix(xi_dot)
+    assert all(is_zero(entry) for entry in rest - ours)
+    printed_c11 = (k * d0 * s - 2 * q * c - c / m) * s
+    assert not is_zero(rest[0].diff(xi[0]) - printed_c11)
+
+
+CLOSED_FORM = closed_form(-1)[0]
+
+
+@settings(max_examples=50, deadline=None)
 @given(
     theta=st.floats(-4, 4),
-    eta1=st.floats(0.2, 1.0),
+    speed=st.floats(0.2, 1.0),
     w=st.floats(-2, 2),
-    zeta=st.floats(-1, 1),
+    accel=st.floats(-1, 1),
     jx=st.floats(-5, 5),
     jy=st.floats(-5, 5),
     backwards=st.booleans(),
 )
-def test_heading_split_inverts_the_closed_form(*, theta, eta1, w, zeta, jx, jy, backwards):
+def test_heading_split_inverts_the_closed_form(*, theta, speed, w, accel, jx, jy, backwards):
     """At speed the damped inverse returns the v that makes A + B v the wanted jerk."""
-    eta1 = -eta1 if backwards else eta1
-    c, s = math.cos(theta), math.sin(theta)
-    v1, w_dot = damped_inverse(
-        c * jx + s * jy,
-        c * jy - s * jx,
-        eta1=eta1,
+    cos, sin = math.cos(theta), math.sin(theta)
+    speed = -speed if backwards else speed
+    got_v1, w_dot = damped_inverse(
+        cos * jx + sin * jy,
+        cos * jy - sin * jx,
+        eta1=speed,
         w=w,
-        zeta=zeta,
+        zeta=accel,
         w_dot_rest=0.0,
         lambda_m_s=1e-4,
     )
-    eta2, u2 = -D0_M * w, -D0_M * w_dot
-    third_x = (
-        -c * eta1 * eta2**2 / D0_M**2 + s * 2 * zeta * eta2 / D0_M + c * v1 + eta1 * s / D0_M * u2
-    )
-    third_y = (
-        -s * eta1 * eta2**2 / D0_M**2 - c * 2 * zeta * eta2 / D0_M + s * v1 - eta1 * c / D0_M * u2
-    )
-    assert third_x == pytest.approx(jx, abs=2e-4)
-    assert third_y == pytest.approx(jy, abs=2e-4)
+    values = dict(zip((c, s, eta1, eta2), (cos, sin, speed, -D0_M * w), strict=True))
+    values |= dict(zip((zeta, d0, v1, u2), (accel, D0_M, got_v1, -D0_M * w_dot), strict=True))
+    third = CLOSED_FORM.subs(values)
+    assert float(third[0]) == pytest.approx(jx, abs=2e-4)
+    assert float(third[1]) == pytest.approx(jy, abs=2e-4)
 
 
 def test_inverse_is_bounded_at_standstill_and_lets_a_turn_die():

@@ -1,0 +1,112 @@
+"""The gain procedure: same budget, same runs, known optimum, file round trip."""
+
+import math
+import tomllib
+from collections import Counter
+
+import pytest
+
+from hil.config.control import ControlConfig, Gains
+from hil.tune import (
+    CASES,
+    COST_FAILED,
+    PUSHES,
+    SEARCH,
+    Plan,
+    case_scenario,
+    decode,
+    run_cost,
+    tune,
+    with_values,
+    write_gain_set,
+)
+
+BASE = ControlConfig().active_gains
+PLAN = Plan(cases=("a", "b"), seeds=(1, 2), candidates=121, population=10)
+# Where the made-up cost below has its least value.
+BEST = {"k1_s": 0.5, "sigma_m_s2": 0.1, "kp_s3": 40.0, "kd2_s": 20.0}
+
+
+def distance(outer, gains):
+    values = gains.model_dump()[outer.replace("-", "_")]
+    return sum(math.log(values[n] / best) ** 2 for n, best in BEST.items() if n in values)
+
+
+def bowl(outer, gains, case, seed):
+    """Figures of a run whose error grows with the distance of the gains from BEST."""
+    return {
+        "itae_m_s2": 1.0 + distance(outer, gains) + (case == "b") + 0.1 * seed,
+        "eta1_variation_m_s": 0.0,
+        "theta_dot_variation_rad_s": 0.0,
+    }
+
+
+@pytest.fixture(scope="module")
+def tuned():
+    runs = Counter()
+
+    def counting(outer, gains, case, seed):
+        runs[outer, case, seed] += 1
+        return bowl(outer, gains, case, seed)
+
+    return tune(BASE, counting, PLAN, target="bowl", revision="none"), runs
+
+
+def test_both_laws_get_the_same_candidates_on_the_same_runs(tuned):
+    """121 candidates each, every one on both cases with both seeds."""
+    gains, runs = tuned
+    assert set(runs.values()) == {121}
+    assert len(runs) == 2 * 2 * 2
+    assert gains.origin["candidates_pid"] == gains.origin["candidates_asg-ism"] == 121
+
+
+def test_it_finds_the_least_of_a_bowl(tuned):
+    """Two gains of each law come within 15 % of where the cost is least."""
+    gains, _ = tuned
+    assert gains.pid.kp_s3 == pytest.approx(40.0, rel=0.15)
+    assert gains.pid.kd2_s == pytest.approx(20.0, rel=0.15)
+    assert gains.asg_ism.k1_s == pytest.approx(0.5, rel=0.15)
+    assert gains.asg_ism.sigma_m_s2 == pytest.approx(0.1, rel=0.15)
+    # The mean over cases adds 0.5 and over seeds 0.15 to the bowl's least of 1.
+    assert gains.origin["cost_pid"] == pytest.approx(1.65, abs=0.05)
+
+
+def test_the_search_is_repeatable():
+    """The same plan gives the same gains, bit for bit."""
+    plan = Plan(cases=("a",), seeds=(1,), candidates=41)
+    runs = [tune(BASE, bowl, plan, target="bowl", revision="none") for _ in range(2)]
+    assert runs[0] == runs[1]
+
+
+def test_a_run_without_figures_costs_most():
+    """A missing, NaN or huge figure is the failure cost, no more and no less."""
+    calm = {"itae_m_s2": 2.0, "eta1_variation_m_s": 0.4, "theta_dot_variation_rad_s": 6.0}
+    assert run_cost(calm) == pytest.approx(2.0 + 0.5 * 0.4 + 0.05 * 6.0)
+    assert run_cost({}) == COST_FAILED
+    assert run_cost({**calm, "itae_m_s2": math.nan}) == COST_FAILED
+    assert run_cost({**calm, "itae_m_s2": 1e6}) == COST_FAILED
+
+
+def test_written_gains_are_the_ones_evaluated(tuned, tmp_path):
+    """The file reads back as the same set: values are rounded before they are tried."""
+    gains, _ = tuned
+    write_gain_set(tmp_path / "set.toml", gains)
+    read = tomllib.loads((tmp_path / "set.toml").read_text(encoding="utf-8"))
+    assert Gains.model_validate(read) == gains
+
+
+@pytest.mark.parametrize("outer", SEARCH)
+def test_search_bounds_are_valid_gains(outer):
+    """Both corners of the search box pass the bounds of the configuration."""
+    size = len(SEARCH[outer])
+    for corner in (0.0, 1.0):
+        with_values(BASE, outer, decode(outer, [corner] * size))
+
+
+def test_cases_are_scenarios_calm_and_pushed():
+    """Each case loads; a pushed one differs by the disturbances only, and takes the gains."""
+    gains = with_values(BASE, "pid", {"kp_s3": 12.5})
+    for case in CASES:
+        scenario = case_scenario(case, gains)
+        assert scenario.control.active_gains.pid.kp_s3 == 12.5
+        assert scenario.disturbances == (PUSHES if case.endswith("/pushed") else ())
