@@ -1,0 +1,205 @@
+"""The rendered camera: frames of the robot on the floor as a linear 8-bit colour sensor sees them.
+
+The geometry (lens, floor, robot, blur over the exposure) and the sensor noise are in
+`native/render*.cpp`; here the configuration is turned into the renderer's numbers, and the floor's
+texture and the light are drawn once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.config.camera import (
+    BarConfig,
+    CameraConfig,
+    ClutterConfig,
+    GlareConfig,
+    RobotLookConfig,
+    SceneConfig,
+    ShadowEdgeConfig,
+    TagConfig,
+)
+from hil.errors import BadInput
+from sim_twin import _native
+
+TEXTURE_SIZE = 800
+TEXTURE_PERIOD_M = 2.0  # about; a whole number of tiles
+JOINT_M = 0.004
+JOINT_RATIO = 0.75
+
+Map = NDArray[np.float64]
+
+
+class RenderedCamera:
+    """Frames of one camera over one floor, the same for the same seed, index and poses."""
+
+    def __init__(self, camera: CameraConfig, seed: int) -> None:
+        self.width_px = camera.width_px
+        self.height_px = camera.height_px
+        view = _view(camera)
+        floor_m = np.asarray(_native.floor_map(view))
+        self._renderer = _native.Renderer(view, _scene(camera.scene, floor_m), _robot(camera), seed)
+
+    def make(self, index: int, poses: Sequence[tuple[float, float, float]]) -> NDArray[np.uint8]:
+        """Return frame `index`, (height, width, 3) uint8 BGR.
+
+        `poses` are (x_m, y_m, theta_rad) of the robot in world axes, evenly spaced from the start
+        to the end of the exposure (two or more show motion blur); none gives the empty floor.
+        """
+        image: NDArray[np.uint8] = self._renderer.make(index, poses)
+        return image
+
+
+def _view(camera: CameraConfig) -> _native.View:
+    model = camera.model()
+    view = _native.View()
+    view.width, view.height = model.width_px, model.height_px
+    view.fx, view.fy, view.cx, view.cy = model.fx_px, model.fy_px, model.cx_px, model.cy_px
+    view.dist = list(model.dist)
+    view.R = model.R_world_cam.ravel().tolist()
+    view.t = model.t_world_cam_m.tolist()
+    return view
+
+
+def _robot(camera: CameraConfig) -> _native.Robot:
+    look, marks = camera.robot_look, camera.marks
+    robot = _native.Robot()
+    robot.half_length, robot.half_width = 0.5 * look.plate_length_m, 0.5 * look.plate_width_m
+    robot.bottom, robot.top = look.body_bottom_m, marks.height_m
+    robot.wheel_radius, robot.wheel_half_width = look.wheel_radius_m, 0.5 * look.wheel_width_m
+    robot.half_track, robot.half_base = 0.5 * look.track_m, 0.5 * look.wheelbase_m
+    robot.plate, robot.side = look.plate_colour, look.side_colour
+    robot.tyre, robot.hub = look.tyre_colour, look.hub_colour
+    colours = [marks.front.colour, marks.rear.colour]
+    if marks.swapped_marks:
+        colours.reverse()
+    patches = [] if look.tag else [_board(look)]
+    for mark, colour in zip((marks.front, marks.rear), colours, strict=True):
+        disc = _native.Patch()
+        disc.disc = disc.mark = True
+        disc.x, disc.y, disc.half_x = mark.x_m, mark.y_m, 0.5 * marks.diameter_m
+        disc.colour = colour
+        patches.append(disc)
+    robot.patches = patches
+    if look.tag:
+        robot.tag = _tag(look.tag)
+    return robot
+
+
+def _board(look: RobotLookConfig) -> _native.Patch:
+    board = _native.Patch()
+    board.half_x, board.half_y = 0.5 * look.board_size_m[0], 0.5 * look.board_size_m[1]
+    board.colour = look.board_colour
+    return board
+
+
+def _tag(tag: TagConfig) -> _native.Grid:
+    """Return the tag's cells, black border included; raises BadInput for an unknown tag."""
+    number = getattr(cv2.aruco, tag.dictionary, None)
+    if number is None:
+        raise BadInput(
+            f"camera.robot_look.tag.dictionary: OpenCV has no {tag.dictionary!r}; try DICT_4X4_50"
+        )
+    dictionary = cv2.aruco.getPredefinedDictionary(number)
+    if tag.tag_id >= len(dictionary.bytesList):
+        raise BadInput(
+            f"camera.robot_look.tag.tag_id = {tag.tag_id}: {tag.dictionary} ends at"
+            f" {len(dictionary.bytesList) - 1}"
+        )
+    cells = dictionary.markerSize + 2
+    image = cv2.aruco.generateImageMarker(dictionary, tag.tag_id, cells)
+    grid = _native.Grid()
+    grid.cells, grid.x, grid.y, grid.half = cells, tag.x_m, tag.y_m, 0.5 * tag.size_m
+    grid.margin = tag.margin_ratio * tag.size_m
+    grid.white = (image.ravel() > 127).astype(int).tolist()
+    return grid
+
+
+def _scene(scene: SceneConfig, floor_m: Map) -> _native.Scene:
+    native = _native.Scene()
+    native.floor = scene.floor_colour
+    native.blocks = [_block(thing) for thing in scene.clutter]
+    native.bars = [_bar(bar) for bar in scene.bars]
+    native.white_balance = scene.white_balance
+    native.blur = scene.blur_px
+    native.read_noise = scene.read_noise_dn
+    native.dn_per_electron = 255.0 / scene.full_well_e
+    native.lamp_x, native.lamp_y = scene.lamp_lean
+    native.shade = scene.robot_shade_ratio
+    native.set_texture(*_texture(scene))
+    light = scene.white_dn * _gradient(scene, floor_m) * _shadow(scene.shadow_edge, floor_m)
+    native.set_light(light.astype(np.float32), _glare(scene.glare, floor_m).astype(np.float32))
+    return native
+
+
+def _block(thing: ClutterConfig) -> _native.Block:
+    block = _native.Block()
+    block.disc = thing.shape == "disc"
+    block.x, block.y, block.theta = thing.x_m, thing.y_m, thing.theta_rad
+    block.half_x, block.half_y = 0.5 * thing.size_m[0], 0.5 * thing.size_m[1]
+    block.top = thing.height_m
+    block.colour = thing.colour
+    return block
+
+
+def _bar(config: BarConfig) -> _native.Bar:
+    bar = _native.Bar()
+    bar.body = config.frame == "body"
+    bar.x0, bar.y0 = config.start_m
+    bar.x1, bar.y1 = config.end_m
+    bar.half_width, bar.z = 0.5 * config.width_m, config.height_m
+    bar.colour = config.colour
+    return bar
+
+
+def _texture(scene: SceneConfig) -> tuple[NDArray[np.float32], float]:
+    """Return the floor's reflectance factor, (N, N) and periodic, and its step in m."""
+    tiles = max(1, round(TEXTURE_PERIOD_M / scene.tile_m))
+    step_m = tiles * scene.tile_m / TEXTURE_SIZE
+    rng = np.random.default_rng(scene.texture_seed)
+    spectrum = np.fft.rfft2(rng.standard_normal((TEXTURE_SIZE, TEXTURE_SIZE)))
+    ky = np.fft.fftfreq(TEXTURE_SIZE, step_m)[:, None]
+    kx = np.fft.rfftfreq(TEXTURE_SIZE, step_m)[None, :]
+    cycles = np.hypot(kx, ky)
+    # Blotches of decimetres and grain of some 6 mm, about equal in strength.
+    weight = 1.0 / (1.0 + (cycles / 4.0) ** 1.5) + 0.05 * np.exp(-((cycles * 0.006) ** 2))
+    weight[0, 0] = 0.0
+    speckle = np.fft.irfft2(spectrum * weight, s=(TEXTURE_SIZE, TEXTURE_SIZE))
+    texture = 1.0 + scene.texture_ratio * speckle / speckle.std()
+    to_joint = np.abs(np.arange(TEXTURE_SIZE) * step_m % scene.tile_m - 0.5 * scene.tile_m)
+    joint = to_joint < 0.5 * JOINT_M
+    texture[joint, :] *= JOINT_RATIO
+    texture[:, joint] *= JOINT_RATIO
+    return np.clip(texture, 0.2, 2.0).astype(np.float32), step_m
+
+
+def _gradient(scene: SceneConfig, floor_m: Map) -> Map:
+    """Return the light's fall across the image, 1 at its bright end."""
+    height, width = floor_m.shape[:2]
+    v, u = np.mgrid[0:height, 0:width]
+    across = math.cos(scene.gradient_azimuth_rad) * u + math.sin(scene.gradient_azimuth_rad) * v
+    span = (across - across.min()) / (across.max() - across.min())
+    return np.asarray(1.0 - scene.gradient_ratio * (1.0 - span))
+
+
+def _shadow(edge: ShadowEdgeConfig | None, floor_m: Map) -> Map:
+    """Return the share of light a shadow edge leaves: shade lies left of its direction."""
+    if edge is None:
+        return np.ones(floor_m.shape[:2])
+    normal = (-math.sin(edge.azimuth_rad), math.cos(edge.azimuth_rad))
+    into_m = (floor_m - np.array(edge.through_m)) @ np.array(normal)
+    t = np.clip(into_m / max(edge.softness_m, 1e-6) + 0.5, 0.0, 1.0)
+    return np.asarray(1.0 - edge.depth_ratio * t * t * (3.0 - 2.0 * t))
+
+
+def _glare(glare: GlareConfig | None, floor_m: Map) -> Map:
+    """Return the white light added by a mirrored lamp, DN."""
+    if glare is None:
+        return np.zeros(floor_m.shape[:2])
+    away = np.sum((floor_m - np.array((glare.x_m, glare.y_m))) ** 2, axis=2)
+    return np.asarray(glare.peak_dn * np.exp(-0.5 * away / glare.radius_m**2))

@@ -1,0 +1,147 @@
+// The camera of the twin: a linear 8-bit sensor behind a distorted lens at a known pose.
+//
+// Frames: world X right, Y up on the floor, z up, metres; body x forward, y left; camera axes as
+// OpenCV has them. R and t take camera coordinates to the world. DN is the sensor's 8-bit step.
+// Nothing here is shared with the localiser: lens and plane geometry are written a second time, so
+// that an error in either shows.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace camera {
+
+using Colour = std::array<float, 3>;  // reflectance: blue, green, red
+
+struct View {
+    int width = 0, height = 0;  // px
+    double fx = 0, fy = 0, cx = 0, cy = 0;  // px
+    std::array<double, 5> dist{};  // k1 k2 p1 p2 k3
+    std::array<double, 9> R{};  // camera to world, by rows
+    std::array<double, 3> t{};  // camera centre, m
+};
+
+// A disc (radius half_x) or rectangle on the plate, body frame, m.
+struct Patch {
+    bool disc = false, mark = false;
+    float x = 0, y = 0, half_x = 0, half_y = 0;
+    Colour colour{};
+};
+
+// A square grid of black and white cells on the plate (ArUco), rows from body +x down, m.
+struct Grid {
+    int cells = 0;  // per side, 0 for none
+    float x = 0, y = 0, half = 0, margin = 0;
+    std::vector<uint8_t> white;
+};
+
+// Upright box, or flat disc when `disc` (radius half_x at height top), world frame, m.
+struct Block {
+    bool disc = false;
+    float x = 0, y = 0, half_x = 0, half_y = 0, theta = 0, top = 0;
+    Colour colour{};
+};
+
+// Straight flat bar above the robot, m; ends in the world or in the body frame.
+struct Bar {
+    bool body = false;
+    float x0 = 0, y0 = 0, x1 = 0, y1 = 0, half_width = 0, z = 0;
+    Colour colour{};
+};
+
+struct Robot {
+    float half_length = 0, half_width = 0, bottom = 0, top = 0;  // body box, m
+    float wheel_radius = 0, wheel_half_width = 0, half_track = 0, half_base = 0;  // m
+    Colour plate{}, side{}, tyre{}, hub{};
+    std::vector<Patch> patches;  // the last one drawn lies on top
+    Grid tag;
+};
+
+struct Scene {
+    std::vector<float> texture;  // floor reflectance factor, periodic, by rows
+    int texture_size = 0;  // px per side
+    float texture_step = 0;  // m per px
+    Colour floor{};
+    std::vector<Block> blocks;
+    std::vector<Bar> bars;
+    std::vector<float> light;  // DN of a white surface, per pixel
+    std::vector<float> glare;  // DN added, per pixel
+    Colour white_balance{};
+    float blur = 0;  // px RMS
+    float read_noise = 0, dn_per_electron = 0;  // DN
+    float lamp_x = 0, lamp_y = 0, shade = 0;  // lean towards the lamp; share of light taken
+};
+
+struct Pose {
+    float x = 0, y = 0, c = 1, s = 0;
+};
+
+// A line of sight as the point where it meets the floor and its lean d(x, y)/dz.
+struct Sight {
+    float x = 0, y = 0, lx = 0, ly = 0;
+};
+
+// Where in its pixel and when in the exposure one sample is taken.
+struct Sample {
+    float du = 0, dv = 0;
+    int slot = 0;
+};
+
+class Renderer {
+public:
+    Renderer(const View& view, const Scene& scene, const Robot& robot, uint64_t seed);
+
+    // Writes the frame `index`, (height, width, 3); poses are (x, y, theta), evenly spaced from
+    // the start to the end of the exposure.
+    void make(uint64_t index, const std::vector<std::array<double, 3>>& poses, uint8_t* out);
+
+private:
+    struct Window {
+        int u0, v0, u1, v1;
+    };
+    void background();
+    void noise_bank();
+    void sample_table();
+    Colour floor_sample(const Sight& sight) const;
+    Sight sight_at(int u, int v, float du, float dv) const;
+    Window window() const;
+    void classify(const Window& w);
+    void composite(const Window& w);
+    void composite_pixel(int u, int v, uint8_t flags, uint8_t id, float* dn) const;
+    uint8_t trace(const Sight& world, const Pose& pose) const;
+    uint8_t trace_top(float x, float y) const;
+    uint8_t trace_sides(const Sight& body) const;
+    float shade_at(int u, int v) const;
+    void quantise(const float* dn, int count, int16_t* level, int16_t* sigma) const;
+    void emit(const int16_t* level, const int16_t* sigma, const int16_t* normal, int count,
+              uint8_t* out) const;
+
+    View view_;
+    Scene scene_;
+    Robot robot_;
+    uint64_t seed_;
+    std::vector<Sight> sight_;  // per pixel centre
+    std::vector<float> static_dn_;  // background before noise
+    std::vector<int16_t> level_, sigma_;  // the same in the noise stage's steps
+    std::vector<int16_t> sigma_of_dn_;
+    std::vector<int16_t> normal_;
+    std::vector<Sample> samples_;
+    std::vector<Colour> colour_of_id_;
+    std::vector<bool> mark_id_;
+    int reach_ = 1;  // px that the lens blur carries an edge
+    float robot_radius_ = 0, robot_height_ = 0;
+    std::vector<Pose> slots_;
+    std::vector<uint8_t> id_first_, id_last_, flags_, flags_row_;
+    std::vector<float> dn_;
+    std::vector<int16_t> window_level_, window_sigma_;
+};
+
+// Normalised, undistorted coordinates of a pixel, by fixed-point iteration.
+void undistort(const View& view, double u, double v, double& x, double& y);
+// Pixel of a world point; false when it lies behind the camera.
+bool project(const View& view, double x, double y, double z, double& u, double& v);
+// Line of sight of a pixel; lean is huge where the pixel does not look down.
+Sight line_of_sight(const View& view, double u, double v);
+
+}  // namespace camera

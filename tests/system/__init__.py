@@ -1,0 +1,1 @@
+"""The whole loop on the twin: bytes, compiled firmware, estimator, laws, record."""
