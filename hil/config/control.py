@@ -168,13 +168,13 @@ class EstimatorConfig(Section):
         1.0, gt=0.2, le=10, description="s, oldest exposure that can still be taken in"
     )
     st_accel_m_s2: float = Field(
-        1.0, gt=0, le=100, description="m/s^2, camera-only: L of the z1 differentiator"
+        0.5, gt=0, le=100, description="m/s^2, camera-only: L of the z1 differentiator"
     )
     st_jerk_m_s3: float = Field(
-        4.0, gt=0, le=1000, description="m/s^3, camera-only: L of the z2 differentiator"
+        1.0, gt=0, le=1000, description="m/s^3, camera-only: L of the z2 differentiator"
     )
     st_theta_ddot_rad_s2: float = Field(
-        12.0, gt=0, le=1000, description="rad/s^2, camera-only: L of the heading differentiator"
+        8.0, gt=0, le=1000, description="rad/s^2, camera-only: L of the heading differentiator"
     )
 
 
