@@ -43,6 +43,7 @@ bool wheels_turn(const Board& b) {
 Text bar_to_arming(const Board& b, const mavlink_command_long_t& m) {
   if (!carries(b.dialect_hash, m.param3, m.param4)) return Text::ARM_DIALECT;
   if (!carries(b.parameter_hash, m.param5, m.param6)) return Text::ARM_PARAMETERS;
+  if (!b.ticked) return Text::ARM_NO_TICK;
   if (b.safety.battery_low) return Text::ARM_BATTERY;
   if (b.safety.encoder_fault) return Text::ARM_ENCODER;
   if (b.safety.standing != 0 || wheels_turn(b)) return Text::ARM_TURNING;

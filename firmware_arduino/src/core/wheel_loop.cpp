@@ -126,7 +126,7 @@ WheelTuning wheel_tuning(const Params& p) {
   }
   t.omega_blend = blend(p.omega_tau_s);
   t.error_rate_blend = blend(p.error_rate_tau_s);
-  t.inv_error_rate_tau_1_s = 1.0f / p.error_rate_tau_s;
+  t.inv_error_rate_tau_1_s = 1.0f / (p.error_rate_tau_s + TICK_S);
   t.ff_duty_s_rad = p.ff_duty_s_rad;
   t.ff_dead_duty = p.ff_dead_duty;
   t.ff_inv_dead_s_rad = 1.0f / p.ff_dead_rad_s;
