@@ -71,21 +71,34 @@ Bytes plausible(Host& host, Random& rng) {
     case 1: return host.command(static_cast<uint16_t>(rng.next()), rng.any_float());
     case 2: return host.command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0f, rng.any_float(), rng.any_float());
     case 3: return host.command(MAV_CMD_REQUEST_MESSAGE, rng.any_float());
-    case 4: return host.param_set(hil::param_spec(static_cast<uint8_t>(rng.below(hil::PARAM_COUNT))).name,
-                                  rng.any_float());
+    case 4: {
+      const auto index = static_cast<uint8_t>(rng.below(hil::PARAM_COUNT));
+      return host.param_set(hil::param_spec(index).name, rng.any_float());
+    }
     default: return host.setpoint(1.0f, -1.0f, static_cast<uint16_t>(rng.next()));
   }
 }
 
 Bytes mutated(Bytes frame, Random& rng, const Bytes& replay) {
+  const uint32_t place = rng.below(static_cast<uint32_t>(frame.size()));
   switch (rng.below(6)) {
-    case 0: for (auto& byte : frame) byte = static_cast<uint8_t>(rng.next()); break;
-    case 1: frame.resize(rng.below(static_cast<uint32_t>(frame.size()))); break;
-    case 2: frame[rng.below(static_cast<uint32_t>(frame.size()))] ^= static_cast<uint8_t>(1u << rng.below(8));
-            break;
-    case 3: frame[1] = static_cast<uint8_t>(rng.next()); frame.resize(280, 0xA5); break;
-    case 4: return replay;
-    default: break;
+    case 0:
+      for (auto& byte : frame) byte = static_cast<uint8_t>(rng.next());
+      break;
+    case 1:
+      frame.resize(place);
+      break;
+    case 2:
+      frame[place] ^= static_cast<uint8_t>(1u << rng.below(8));
+      break;
+    case 3:
+      frame[1] = static_cast<uint8_t>(rng.next());
+      frame.resize(280, 0xA5);
+      break;
+    case 4:
+      return replay;
+    default:
+      break;
   }
   return frame;
 }

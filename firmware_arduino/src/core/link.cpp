@@ -8,7 +8,8 @@ namespace {
 
 void count_frame(Link& link) {
   const uint8_t gap = static_cast<uint8_t>(link.rx.seq - link.next_seq);
-  if (link.heard && gap < 128) link.lost = static_cast<uint16_t>(link.lost + gap);  // a step back is another host or a late frame
+  // A step back is another host or a late frame, not a loss.
+  if (link.heard && gap < 128) link.lost = static_cast<uint16_t>(link.lost + gap);
   link.heard = true;
   link.next_seq = static_cast<uint8_t>(link.rx.seq + 1u);
   ++link.received;
