@@ -107,12 +107,9 @@ def _follow(
 
 
 def _start_worker(news: Queue[tuple[str, float]]) -> None:
-    """Set a worker process up: progress goes to `news`, image work stays on one core."""
-    import cv2  # noqa: PLC0415 - in the worker only
-
+    """Set a worker process up: progress goes to `news`."""
     global _news  # noqa: PLW0603 - the pool hands an initialiser's findings on in no other way
     _news = news
-    cv2.setNumThreads(1)
 
 
 def _work(spec: RunSpec) -> Path:

@@ -8,23 +8,27 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vision.marks import MarkLocaliser
+import cv2
 
 from hil.clocks import CameraClock
 from hil.estimator import BelievedGeometry, make_estimator
 from hil.laws import make_outer_law
 from hil.metrics import LinkStats
 from hil.record.manifest import Manifest, collect_versions, git_revision
+from hil.record.memory import MemoryRecorder
 from hil.record.recorder import Recorder
+from hil.record.tape import TapedRig
 from hil.record.timeline import Timeline
 from hil.references import make_reference
 from hil.session import Parts, Progress, Session
 from hil.targets import SIMULATED, open_rig
 from hil.wire.identity import board_hashes
 from hil.wire.link import BoardLink
+from vision.marks import MarkLocaliser
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
+    from hil.record.memory import RunSink
     from hil.record.reader import RunRecord
     from hil.targets.base import Rig
 
@@ -74,6 +78,9 @@ def new_folder(stem: str) -> Path:
 
 def execute(spec: RunSpec, progress: Progress | None = None) -> RunRecord:
     """Run the spec and return its closed record; raises BadInput before anything is written."""
+    cv2.setNumThreads(
+        1
+    )  # search windows are small: handing them to threads costs more than it saves
     parameters = board_parameters(spec.scenario, spec.inner)
     rig = open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
     try:
@@ -84,9 +91,25 @@ def execute(spec: RunSpec, progress: Progress | None = None) -> RunRecord:
             frame_rate_hz=spec.scenario.camera.rate_hz,
             rerun=spec.rerun,
         )
-        parts = make_parts(spec, rig, recorder)
+        parts = make_parts(spec, TapedRig(rig, recorder.tape), recorder)
         session = Session(spec.scenario, parts, parameters, board_hashes, progress)
         ending = session.run()
+        return recorder.close(ending.outcome, ending.detail, link_stats(parts.link))
+    finally:
+        rig.close()
+
+
+def execute_in_memory(spec: RunSpec, rig: Rig | None = None) -> RunRecord:
+    """Run the spec and return what a record would hold, without writing one (spec.out is unused).
+
+    `rig` is another one than the spec's target names; it is closed here.
+    """
+    parameters = board_parameters(spec.scenario, spec.inner)
+    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
+    try:
+        recorder = MemoryRecorder(make_manifest(spec))
+        parts = make_parts(spec, rig, recorder)
+        ending = Session(spec.scenario, parts, parameters, board_hashes).run()
         return recorder.close(ending.outcome, ending.detail, link_stats(parts.link))
     finally:
         rig.close()
@@ -100,7 +123,7 @@ def board_parameters(scenario: Scenario, inner: str) -> dict[str, float]:
     }
 
 
-def make_parts(spec: RunSpec, rig: Rig, recorder: Recorder) -> Parts:
+def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink) -> Parts:
     """Return the parts of a session over `rig`."""
     scenario, control = spec.scenario, spec.scenario.control
     robot = scenario.robot

@@ -46,12 +46,18 @@ AREA_MIN_PX = 6
 
 @dataclass(frozen=True, slots=True)
 class _Blob:
-    """One candidate of a mark: centroid (u, v), area and peak of its response."""
+    """One candidate of a mark: centroid of its response, size against what it should be, place.
+
+    (x_m, y_m) is where the centroid's ray meets the plane of the marks.
+    """
 
     u_px: float
     v_px: float
     area_px: float
+    area_ratio: float
     peak_dn: float
+    x_m: float
+    y_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +66,6 @@ class _Found:
 
     front: _Blob
     rear: _Blob
-    pose: Pose
-    residual_m: float
     misfit: float
 
 
@@ -80,7 +84,7 @@ class MarkLocaliser:
         self._purity = [
             _purity(mix, m) for mix, m in zip(self._mix, (marks.front, marks.rear), strict=True)
         ]
-        angles = np.arange(RIM_POINTS) * (2.0 * np.pi / RIM_POINTS)
+        angles = np.arange(RIM_POINTS + 1) * (2.0 * np.pi / RIM_POINTS)
         self._rim_m = self._radius_m * np.stack((np.cos(angles), np.sin(angles)), axis=1)
 
     def locate(
@@ -115,7 +119,7 @@ class MarkLocaliser:
             )
             if not math.isfinite(u):
                 return None
-            reach_px = reach_m * self._px_per_m(u, v)
+            reach_px = reach_m * self._scale(u, v)[2]
             corners.append((u - reach_px, v - reach_px, u + reach_px, v + reach_px))
         height, width = image.shape[:2]
         left = max(0, int(min(corner[0] for corner in corners)))
@@ -124,12 +128,17 @@ class MarkLocaliser:
         bottom = min(height, int(max(corner[3] for corner in corners)) + 2)
         return (left, top, right, bottom) if right - left > 8 and bottom - top > 8 else None
 
-    def _px_per_m(self, u_px: float, v_px: float) -> float:
-        """Return the scale on the plane of the marks, the larger of both directions."""
-        x, y = self._model.floor_point(u_px, v_px, self._height_m)
-        u1, v1 = self._model.project_point(x + 0.01, y, self._height_m)
-        u2, v2 = self._model.project_point(x, y + 0.01, self._height_m)
-        return 100.0 * max(math.hypot(u1 - u_px, v1 - v_px), math.hypot(u2 - u_px, v2 - v_px))
+    def _scale(self, u_px: float, v_px: float) -> tuple[float, float, float, float]:
+        """Return (x, y) m on the marks' plane, px per m (the larger way), and px^2 per m^2."""
+        project, height_m = self._model.project_point, self._height_m
+        x, y = self._model.floor_point(u_px, v_px, height_m)
+        if not math.isfinite(x):
+            return math.nan, math.nan, math.nan, math.nan
+        ux, vx = project(x + _STEP_M, y, height_m)
+        uy, vy = project(x, y + _STEP_M, height_m)
+        ax, bx, ay, by = ux - u_px, vx - v_px, uy - u_px, vy - v_px
+        linear = max(math.hypot(ax, bx), math.hypot(ay, by)) / _STEP_M
+        return x, y, linear, abs(ax * by - ay * bx) / _STEP_M**2
 
     def _search(self, image: Image, window: tuple[int, int, int, int]) -> tuple[_Found | None, str]:
         """Return the best pair in the window, or None and the reason."""
@@ -157,85 +166,55 @@ class MarkLocaliser:
             x, y, w, h, area = (int(value) for value in stats[label])
             if area < AREA_MIN_PX:
                 break
-            blob = self._measure(part, index, (x, y, w, h))
-            if blob is not None:
-                moved = _Blob(blob.u_px + left, blob.v_px + top, blob.area_px, blob.peak_dn)
-                if self._right_size(moved):
-                    blobs.append(moved)
+            centroid = _centroid(part, self._mix[index], (x, y, w, h))
+            if centroid is not None:
+                u_px, v_px, area_px, peak_dn = centroid
+                blob = self._blob(u_px + left, v_px + top, area_px, peak_dn)
+                if AREA_RATIO[0] <= blob.area_ratio <= AREA_RATIO[1]:
+                    blobs.append(blob)
         return blobs
 
-    def _measure(self, part: Image, index: int, box: tuple[int, int, int, int]) -> _Blob | None:
-        """Return the centroid of the response in and just around a component's box."""
-        x, y, w, h = box
-        x0, y0 = max(0, x - MARGIN_PX), max(0, y - MARGIN_PX)
-        near = part[y0 : y + h + MARGIN_PX, x0 : x + w + MARGIN_PX]
-        response = cv2.transform(near.astype(np.float32), self._mix[index][None, :])
-        peak = float(np.quantile(response, 0.9)) if min(w, h) > 4 else float(response.max())
-        peak = max(peak, 0.5 * float(response.max()))
-        if peak < RESPONSE_MIN_DN:
-            return None
-        _, core = cv2.threshold(response, EDGE_SHARE * peak, 255, cv2.THRESH_BINARY)
-        core8 = core.astype(np.uint8)
-        count, labels, stats, _ = cv2.connectedComponentsWithStats(core8, connectivity=8)
-        if count < 2:
-            return None
-        label = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
-        # Two pixels beyond the edge: the mark's own blurred rim, with its share of coverage.
-        reach = cv2.dilate((labels == label).astype(np.uint8), _DISC)
-        weight = np.where(reach > 0, np.maximum(response, 0.0), 0.0).astype(np.float32)
-        moments = cv2.moments(weight)
-        mass = moments["m00"]
-        inside = response[labels == label]
-        level = float(np.median(inside[inside > 0.8 * inside.max()])) if inside.size else 0.0
-        if mass <= 0.0 or level <= 0.0:
-            return None
-        return _Blob(moments["m10"] / mass + x0, moments["m01"] / mass + y0, mass / level, level)
+    def _blob(self, u_px: float, v_px: float, area_px: float, peak_dn: float) -> _Blob:
+        x, y, _, area_scale = self._scale(u_px, v_px)
+        expected_px = math.pi * self._radius_m**2 * area_scale
+        ratio = area_px / expected_px if expected_px > 0.0 else math.inf
+        return _Blob(u_px, v_px, area_px, ratio, peak_dn, x, y)
 
-    def _right_size(self, blob: _Blob) -> bool:
-        expected_px = self._disc(blob)[2]
-        return AREA_RATIO[0] * expected_px <= blob.area_px <= AREA_RATIO[1] * expected_px
+    def _centre(self, blob: _Blob) -> tuple[float, float]:
+        """Return (X, Y) of the disc whose image has its centroid at the blob.
 
-    def _disc(self, blob: _Blob) -> tuple[float, float, float]:
-        """Return (du, dv, area) px of the mark's image at a blob.
-
-        (du, dv) is how far the centroid of the projected disc lies from its projected centre.
+        The centroid of a disc's image lies off the image of its centre, by perspective and lens.
         """
-        x, y = self._model.floor_point(blob.u_px, blob.v_px, self._height_m)
-        if not math.isfinite(x):
-            return 0.0, 0.0, math.inf
-        rim = np.empty((RIM_POINTS, 3))
-        rim[:, :2] = self._rim_m + np.array((x, y))
+        rim = np.empty((RIM_POINTS + 1, 3))
+        rim[:, :2] = self._rim_m
+        rim[:, 0] += blob.x_m
+        rim[:, 1] += blob.y_m
         rim[:, 2] = self._height_m
         u, v = (self._model.project(rim) - (blob.u_px, blob.v_px)).T
-        cross = u * np.roll(v, -1) - np.roll(u, -1) * v
-        area = 0.5 * float(cross.sum())
-        if not abs(area) > 0.0:
-            return 0.0, 0.0, math.inf
-        du = float(((u + np.roll(u, -1)) * cross).sum()) / (6.0 * area)
-        dv = float(((v + np.roll(v, -1)) * cross).sum()) / (6.0 * area)
-        return du, dv, abs(area)
+        cross = u[:-1] * v[1:] - u[1:] * v[:-1]
+        six_areas = 3.0 * float(cross.sum())
+        du = float((u[:-1] + u[1:]) @ cross) / six_areas
+        dv = float((v[:-1] + v[1:]) @ cross) / six_areas
+        return self._model.floor_point(blob.u_px - du, blob.v_px - dv, self._height_m)
 
     def _pair(self, front: _Blob, rear: _Blob) -> _Found | None:
         """Return the pair as the robot's marks, None when their distance is not the robot's."""
-        world, misfit = [], 0.0
-        for blob in (front, rear):
-            du, dv, expected_px = self._disc(blob)
-            world.append(self._model.floor_point(blob.u_px - du, blob.v_px - dv, self._height_m))
-            misfit += abs(math.log(blob.area_px / expected_px))
-        gap = math.dist(*world) / self._distance_m - 1.0
+        gap = math.hypot(front.x_m - rear.x_m, front.y_m - rear.y_m) / self._distance_m - 1.0
         if not abs(gap) <= DISTANCE_TOLERANCE:
             return None
-        pose, residual_m = fit_pose(self._body_m, world)
-        return _Found(front, rear, pose, residual_m, misfit + 10.0 * abs(gap))
+        sizes = abs(math.log(front.area_ratio)) + abs(math.log(rear.area_ratio))
+        return _Found(front, rear, sizes + 10.0 * abs(gap))
 
     def _measurement(self, found: _Found, *, in_window: bool) -> PoseMeasurement:
         """Return pose, quality (1: sizes and distance as expected) and claimed deviations."""
+        centres = (self._centre(found.front), self._centre(found.rear))
+        pose, residual_m = fit_pose(self._body_m, centres)
         scale_m = self._distance_m / math.hypot(
             found.front.u_px - found.rear.u_px, found.front.v_px - found.rear.v_px
         )
         sigma_m = SIGMA_PX * scale_m * (1.0 + 2.0 * found.misfit)
         return PoseMeasurement(
-            found.pose,
+            pose,
             quality=math.exp(-found.misfit),
             sigma_xy_m=max(sigma_m / math.sqrt(2.0), 2e-4),
             sigma_theta_rad=max(sigma_m * math.sqrt(2.0) / self._distance_m, 1e-3),
@@ -247,13 +226,38 @@ class MarkLocaliser:
                 "front_area_px": found.front.area_px,
                 "rear_area_px": found.rear.area_px,
                 "contrast_dn": min(found.front.peak_dn, found.rear.peak_dn),
-                "residual_m": found.residual_m,
+                "residual_m": residual_m,
                 "window": float(in_window),
             },
         )
 
 
 _DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
+_STEP_M = 0.01
+
+
+def _centroid(
+    part: Image, mix: NDArray[np.float32], box: tuple[int, int, int, int]
+) -> tuple[float, float, float, float] | None:
+    """Return (u, v, area, peak) of the response in and just around a component's box, or None."""
+    x, y, w, h = box
+    x0, y0 = max(0, x - MARGIN_PX), max(0, y - MARGIN_PX)
+    near = part[y0 : y + h + MARGIN_PX, x0 : x + w + MARGIN_PX]
+    response = cv2.transform(near.astype(np.float32), mix[None, :])
+    peak = cv2.minMaxLoc(cv2.blur(response, (3, 3)))[1]
+    if peak < RESPONSE_MIN_DN:
+        return None
+    _, core = cv2.threshold(response, EDGE_SHARE * peak, 255, cv2.THRESH_BINARY)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(core.astype(np.uint8), connectivity=8)
+    label = 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax())
+    # Two pixels beyond the edge: the mark's own blurred rim, with its share of coverage.
+    reach = cv2.dilate(cv2.compare(labels, label, cv2.CMP_EQ), _DISC)
+    weight = cv2.max(response, 0.0)
+    weight[reach == 0] = 0.0
+    level = cv2.mean(weight, cv2.compare(weight, 0.7 * peak, cv2.CMP_GT))[0]
+    moments = cv2.moments(weight)
+    mass = moments["m00"]
+    return moments["m10"] / mass + x0, moments["m01"] / mass + y0, mass / level, level
 
 
 def _response(mark: MarkConfig, other: MarkConfig) -> Array:

@@ -296,26 +296,47 @@ void Renderer::emit(const int16_t* level, const int16_t* sigma, const int16_t* n
     }
 }
 
+// The poses at the middle of each time slot of the exposure. They are rounded to a grid far below
+// what the sensor can tell (0.003 px), so that a robot at rest is drawn once and only its noise anew.
+std::vector<Pose> Renderer::slots_of(const std::vector<std::array<double, 3>>& poses) {
+    constexpr double GRID[3] = {1e-5, 1e-5, 5e-5};  // m, m, rad
+    std::vector<Pose> slots;
+    for (int i = 0; i < SLOTS; ++i) {
+        const double at = (i + 0.5) / SLOTS * static_cast<double>(poses.size() - 1);
+        const size_t low = static_cast<size_t>(at), high = std::min(low + 1, poses.size() - 1);
+        const double f = at - static_cast<double>(low);
+        double p[3];
+        for (int k = 0; k < 3; ++k) {
+            p[k] = poses[low][k] + f * (poses[high][k] - poses[low][k]);
+            p[k] = std::round(p[k] / GRID[k]) * GRID[k];
+        }
+        slots.push_back({static_cast<float>(p[0]), static_cast<float>(p[1]),
+                         static_cast<float>(std::cos(p[2])), static_cast<float>(std::sin(p[2]))});
+    }
+    return slots;
+}
+
+bool Renderer::same(const std::vector<Pose>& a, const std::vector<Pose>& b) {
+    return a.size() == b.size() &&
+           std::equal(a.begin(), a.end(), b.begin(), [](const Pose& p, const Pose& q) {
+               return p.x == q.x && p.y == q.y && p.c == q.c && p.s == q.s;
+           });
+}
+
 void Renderer::make(uint64_t index, const std::vector<std::array<double, 3>>& poses,
                     uint8_t* out) {
     Window w{0, 0, 0, 0};
     if (!poses.empty()) {
-        slots_.clear();
-        for (int i = 0; i < SLOTS; ++i) {
-            const double at = (i + 0.5) / SLOTS * static_cast<double>(poses.size() - 1);
-            const size_t low = static_cast<size_t>(at), high = std::min(low + 1, poses.size() - 1);
-            const double f = at - static_cast<double>(low);
-            double p[3];
-            for (int k = 0; k < 3; ++k) p[k] = poses[low][k] + f * (poses[high][k] - poses[low][k]);
-            slots_.push_back({static_cast<float>(p[0]), static_cast<float>(p[1]),
-                              static_cast<float>(std::cos(p[2])),
-                              static_cast<float>(std::sin(p[2]))});
+        const std::vector<Pose> drawn = slots_of(poses);
+        if (!same(drawn, slots_)) {
+            slots_ = drawn;
+            drawn_window_ = window();
+            if (drawn_window_.u1 > drawn_window_.u0 && drawn_window_.v1 > drawn_window_.v0) {
+                classify(drawn_window_);
+                composite(drawn_window_);
+            }
         }
-        w = window();
-        if (w.u1 > w.u0 && w.v1 > w.v0) {
-            classify(w);
-            composite(w);
-        }
+        w = drawn_window_;
     }
     const int width = view_.width;
     for (int v = 0; v < view_.height; ++v) {

@@ -105,6 +105,8 @@ private:
     void sample_table();
     Colour floor_sample(const Sight& sight) const;
     Sight sight_at(int u, int v, float du, float dv) const;
+    static std::vector<Pose> slots_of(const std::vector<std::array<double, 3>>& poses);
+    static bool same(const std::vector<Pose>& a, const std::vector<Pose>& b);
     Window window() const;
     void classify(const Window& w);
     void composite(const Window& w);
@@ -131,7 +133,8 @@ private:
     std::vector<bool> mark_id_;
     int reach_ = 1;  // px that the lens blur carries an edge
     float robot_radius_ = 0, robot_height_ = 0;
-    std::vector<Pose> slots_;
+    std::vector<Pose> slots_;  // as last composited into the window buffers
+    Window drawn_window_{0, 0, 0, 0};
     std::vector<uint8_t> id_first_, id_last_, flags_, flags_row_;
     std::vector<float> dn_;
     std::vector<int16_t> window_level_, window_sigma_;
