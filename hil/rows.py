@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from hil.wire.link import BoardLink, WheelReport
 
 _NAN = math.nan
-_MARKS = ("front_u_px", "front_v_px", "rear_u_px", "rear_v_px")
+MARKS = ("front_u_px", "front_v_px", "rear_u_px", "rear_v_px")
 _NO_ESTIMATE = (_NAN,) * 5
 _NO_REPORT = (_NAN,) * 6
 
@@ -94,5 +94,5 @@ def frame_row(
         measurement.quality,
         measurement.sigma_xy_m,
         measurement.sigma_theta_rad,
-        *(get(name, _NAN) for name in _MARKS),
+        *(get(name, _NAN) for name in MARKS),
     )

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from hil.clocks import CameraClock
     from hil.config.scenario import Scenario
     from hil.estimator.odometry import BelievedGeometry
-    from hil.record.recorder import Recorder
+    from hil.record.memory import RunSink
     from hil.record.timeline import Timeline
     from hil.references import Reference
     from hil.targets.base import Frame, Rig
@@ -64,7 +64,7 @@ class Parts:
     law: OuterLaw
     reference: Reference
     geometry: BelievedGeometry
-    recorder: Recorder
+    recorder: RunSink
     timeline: Timeline
 
 

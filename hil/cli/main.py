@@ -20,6 +20,7 @@ COMMANDS = {
         "Run every scenario of a deck with both laws; one report.",
     ),
     "compare": ("hil.cli.compare", "Compare recorded runs: table, JSON and HTML report."),
+    "replay": ("hil.cli.replay", "Replay a record exactly, or with another law as its shadow."),
     "view": ("hil.cli.view", "Open recorded runs in the viewer."),
     "tune": ("hil.cli.tune", "Tune the gains of both laws by one procedure and budget."),
     "twin": ("hil.cli.twin", "Serve the digital twin to other programs."),

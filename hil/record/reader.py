@@ -97,11 +97,11 @@ def read_run(path: Path) -> RunRecord:
     if manifest.outcome == "running":
         problems.append("cut off in mid-run: the record was never closed")
     problems += altered_files(path, manifest)
-    samples = _table(path, layout.SAMPLES, layout.SAMPLES_JOURNAL, required=True)
+    samples = read_table(path, layout.SAMPLES, layout.SAMPLES_JOURNAL, required=True)
     missing = [name for name in SAMPLE_NAMES if name not in samples]
     if missing:
         raise BadInput(f"{path / layout.SAMPLES}: damaged: column {missing[0]} is missing")
-    frames = _table(path, layout.FRAMES, layout.FRAMES_JOURNAL, required=False)
+    frames = read_table(path, layout.FRAMES, layout.FRAMES_JOURNAL, required=False)
     return RunRecord(
         path=path,
         manifest=manifest,
@@ -127,7 +127,8 @@ def altered_files(path: Path, manifest: Manifest) -> list[str]:
     return found
 
 
-def _table(path: Path, parquet: str, journal: str, *, required: bool) -> Columns:
+def read_table(path: Path, parquet: str, journal: str, *, required: bool) -> Columns:
+    """Return a table from its Parquet file, or from the journal that a crash left."""
     if (path / parquet).is_file():
         return read_parquet(path / parquet)
     if (path / journal).is_file():

@@ -17,6 +17,7 @@ from hil.record.journal import Columns, Journal, read_journal, write_parquet
 from hil.record.manifest import Manifest, Outcome, file_entry, replace_file, write_manifest
 from hil.record.reader import RunRecord, read_events, read_pictures
 from hil.record.schema import FRAME_COLUMNS, FRAME_NAMES, SAMPLE_COLUMNS, SAMPLE_NAMES, Column
+from hil.record.tape import TapeWriter
 from hil.record.tlog import TlogWriter
 
 if TYPE_CHECKING:
@@ -51,6 +52,7 @@ class Recorder:
         self._samples = Journal(out_dir / layout.SAMPLES_JOURNAL, SAMPLE_NAMES)
         self._frames = Journal(out_dir / layout.FRAMES_JOURNAL, FRAME_NAMES)
         self._tlog = TlogWriter(out_dir / layout.LINK, manifest.start_unix_us)
+        self.tape = TapeWriter(out_dir / layout.TAPE)
         self._events = (out_dir / layout.EVENTS).open("w", encoding="utf-8")
         self._camera: CameraKeeper | None = None
         self._video = out_dir / layout.CAMERA if record_camera else None
@@ -113,6 +115,7 @@ class Recorder:
         self._samples.flush()
         self._frames.flush()
         self._tlog.flush()
+        self.tape.flush()
         self._events.flush()
 
     def close(
@@ -146,7 +149,7 @@ class Recorder:
         return self._seal(run)
 
     def _stop_writers(self) -> None:
-        for writer in (self._samples, self._frames, self._tlog, self._events):
+        for writer in (self._samples, self._frames, self._tlog, self.tape, self._events):
             writer.close()
         if self._camera is not None:
             self._camera.close()

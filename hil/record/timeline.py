@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 from hil.rows import frame_row
 
 if TYPE_CHECKING:
-    from hil.record.recorder import Recorder
+    from hil.record.memory import RunSink
     from hil.targets.base import Frame
     from hil.types import PoseMeasurement
 
@@ -20,7 +20,7 @@ class Timeline:
     written with its negative times.
     """
 
-    def __init__(self, recorder: Recorder) -> None:
+    def __init__(self, recorder: RunSink) -> None:
         self._recorder = recorder
         self._origin_s: float | None = None
         self._held: list[tuple[float, Callable[[float], None]]] = []

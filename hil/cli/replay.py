@@ -1,0 +1,88 @@
+"""`hil replay`: a run record through the host's own loop again, exactly or as a shadow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from hil.cli.options import LAWS, json_option, print_json, set_option
+
+if TYPE_CHECKING:
+    from hil.replay.exact import ReplayReport
+
+
+@click.command("replay")
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option("--outer", type=LAWS, help="Shadow: what this outer law would have commanded.")
+@set_option
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
+              help="Folder for replay.json and replayed.parquet; must not exist or be empty.")  # fmt: skip
+@json_option
+def command(
+    run: Path,
+    outer: str | None,
+    overrides: tuple[str, ...],
+    out: Path | None,
+    as_json: bool,
+) -> int:
+    """Send the recorded frames and bytes of RUN through localisation, estimator and law again.
+
+    Without options the replay is exact: it must give the recorded commands bit for bit (exit
+    status 0), or the first difference of each channel is reported (1). With --outer or --set it is
+    a shadow: what that law would have commanded in each recorded state. The robot did not follow
+    the shadow, so this is open loop and no verdict on the other law.
+    """
+    from hil.cli.progress import run_progress
+    from hil.record.manifest import read_manifest
+    from hil.replay.exact import replay
+    from hil.replay.output import claim_folder, write_output
+
+    duration_s = float(read_manifest(run).scenario.get("duration_s", 0.0))
+    if out is not None:
+        claim_folder(out)
+    with run_progress({run.name: duration_s}) as update:
+        report = replay(run, outer, overrides, lambda t_s: update(run.name, t_s))
+    if out is not None:
+        write_output(out, report)
+    if as_json:
+        print_json(report.to_json())
+    else:
+        print_report(report)
+    return 0 if report.kind == "shadow" or report.identical else 1
+
+
+def print_report(report: ReplayReport) -> None:
+    """Write the verdict and every channel that differs to stdout."""
+    from rich.console import Console
+
+    console = Console(highlight=False, soft_wrap=True, markup=False)
+    for problem in report.problems:
+        console.print(f"note: {problem}")
+    console.print(headline(report))
+    different = [channel for channel in report.channels if not channel.same]
+    if not different:
+        return
+    first = report.first
+    assert first is not None
+    console.print(f"first difference: {first.text()}")
+    for channel in different:
+        if channel is not first:
+            console.print(f"  {channel.text()}")
+    same = ", ".join(channel.name for channel in report.channels if channel.same)
+    console.print(f"identical: {same or 'no channel'}")
+
+
+def headline(report: ReplayReport) -> str:
+    """Return the answer in one sentence."""
+    covered = f"{report.ticks_replayed} of {report.ticks_recorded} ticks, from {report.seen_by}"
+    if report.kind == "shadow":
+        changed = "".join(f", {change}" for change in report.changes)
+        return (
+            f"shadow of {report.law}{changed} (open loop: the robot followed the recorded "
+            f"commands): {covered}"
+        )
+    verdict = "reproduces the record bit for bit" if report.identical else "DIFFERS from the record"
+    cut = "; the record ends in mid-run, the intact part was replayed" if report.cut_off else ""
+    return f"exact replay {verdict}: {covered}{cut}"

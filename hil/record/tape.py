@@ -1,0 +1,176 @@
+"""`inputs.tape`: everything a session was told from below, in order, so that it can be told again.
+
+A session learns of the world in four ways: what the host clock shows, which bytes have arrived,
+that a frame has arrived, and that something broke. The tape holds just that, clock readings as
+float64 and bytes as they came (good or damaged). With frames.parquet, or camera.mkv, beside it a
+replay is exact on any target, also where the clock is the wall's (docs/replay.md).
+
+One line of JSON, then entries: a kind byte and its value. A torn last entry is left by the reader.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hil.errors import BadInput, RigFault
+
+if TYPE_CHECKING:
+    from hil.targets.base import ByteStream, Frame, Rig, Truth
+
+_HEADER = json.dumps({"format": "hil-tape-1"}).encode() + b"\n"
+_CLOCK = struct.Struct("<cd")
+_BLOCK = struct.Struct("<cI")
+
+# A clock reading, and one that is the first after a wait: readings of one instant belong together.
+CLOCK, WAITED = b"C", b"W"
+BYTES, FRAME = b"R", b"F"
+FAULT, INTERRUPT = b"X", b"K"
+
+Entry = tuple[bytes, float | bytes]
+
+
+class TapeWriter:
+    """Appends entries; `write` takes them packed."""
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("wb")
+        self.write: Callable[[bytes], int] = self._file.write
+        self.write(_HEADER)
+
+    def flush(self) -> None:
+        """Make the entries so far survive the death of this process."""
+        self._file.flush()
+
+    def close(self) -> None:
+        """Flush and close; safe to call twice."""
+        self._file.close()
+
+    def stop(self, cause: BaseException) -> None:
+        """Note that the rig broke, or that the user stopped the run, at this very place."""
+        fault = isinstance(cause, RigFault)
+        text = str(cause).encode()
+        self.write(_BLOCK.pack(FAULT if fault else INTERRUPT, len(text)) + text)
+
+
+class TapedStream:
+    """A byte stream whose reading is taped; what is written is in link.tlog."""
+
+    def __init__(self, stream: ByteStream, tape: TapeWriter) -> None:
+        self._stream = stream
+        self._tape = tape
+
+    def read(self) -> bytes:
+        """Return every byte that has arrived by now, b"" if none."""
+        try:
+            data = self._stream.read()
+        except (RigFault, KeyboardInterrupt) as cause:
+            self._tape.stop(cause)
+            raise
+        if data:
+            self._tape.write(_BLOCK.pack(BYTES, len(data)) + data)
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Send the bytes."""
+        try:
+            self._stream.write(data)
+        except (RigFault, KeyboardInterrupt) as cause:
+            self._tape.stop(cause)
+            raise
+
+
+class TapedRig:
+    """A rig whose every answer is taped; otherwise it is the rig itself."""
+
+    def __init__(self, rig: Rig, tape: TapeWriter) -> None:
+        self._rig = rig
+        self._tape = tape
+        self._kind = WAITED
+        self.stream: ByteStream = TapedStream(rig.stream, tape)
+
+    def now_s(self) -> float:
+        """Return the host clock."""
+        now_s = self._rig.now_s()
+        self._tape.write(_CLOCK.pack(self._kind, now_s))
+        self._kind = CLOCK
+        return now_s
+
+    def wait(self, until_s: float) -> None:
+        """Return at `until_s`, or earlier as soon as bytes or a frame have arrived."""
+        self._kind = WAITED
+        try:
+            self._rig.wait(until_s)
+        except (RigFault, KeyboardInterrupt) as cause:
+            self._tape.stop(cause)
+            raise
+
+    def poll_frame(self) -> Frame | None:
+        """Return the oldest frame not yet taken that has arrived by now."""
+        frame = self._rig.poll_frame()
+        if frame is not None:
+            self._tape.write(FRAME)
+        return frame
+
+    def begin(self, t_start_s: float) -> None:
+        """Take note that the controlled part begins."""
+        self._rig.begin(t_start_s)
+
+    def truth(self) -> Truth | None:
+        """Return the true state now, or None where nobody knows it."""
+        return self._rig.truth()
+
+    def close(self) -> None:
+        """Release the rig."""
+        self._rig.close()
+
+
+@dataclass(frozen=True, slots=True)
+class Tape:
+    """The whole entries of a tape up to its end or to the first flaw, which `problem` names."""
+
+    entries: tuple[Entry, ...]
+    problem: str = ""
+
+
+def read_tape(path: Path) -> Tape:
+    """Return what is whole of a tape; raises BadInput for a file that is none."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
+    if not data.startswith(_HEADER):
+        raise BadInput(f"{path}: damaged: the first line is not that of a hil-tape-1 file")
+    entries: list[Entry] = []
+    at, size = len(_HEADER), len(data)
+    while at < size:
+        found = _entry_at(data, at)
+        if found is None:
+            torn = data[at : at + 1] in _KINDS
+            flaw = "cut off in the middle of an entry" if torn else "damaged"
+            return Tape(tuple(entries), f"{path.name} is {flaw} at byte {at} of {size}")
+        entry, at = found
+        entries.append(entry)
+    return Tape(tuple(entries))
+
+
+_KINDS = (CLOCK, WAITED, BYTES, FRAME, FAULT, INTERRUPT)
+
+
+def _entry_at(data: bytes, at: int) -> tuple[Entry, int] | None:
+    """Return the entry at byte `at` and where the next one begins; None when it is not whole."""
+    kind = data[at : at + 1]
+    if kind == FRAME:
+        return (FRAME, b""), at + 1
+    if kind in {CLOCK, WAITED}:
+        end = at + _CLOCK.size
+        return ((kind, _CLOCK.unpack_from(data, at)[1]), end) if end <= len(data) else None
+    start = at + _BLOCK.size
+    if kind not in _KINDS or start > len(data):
+        return None
+    end = start + _BLOCK.unpack_from(data, at)[1]
+    return ((kind, data[start:end]), end) if end <= len(data) else None
