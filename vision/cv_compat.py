@@ -33,6 +33,7 @@ CORNER_WINDOW_PX = 11
 ITERATIONS = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 100, 1e-4)
 # Half of each tag cell's width left out of the vote: bits survive blur and a slanted view.
 CELL_MARGIN_RATIO = 0.3
+CORNER_WINDOW_CELLS = 0.8
 
 IMAGE_SUFFIXES = {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"}
 _ENDINGS = {b"\xff\xd8": (b"\xff\xd9", "JPEG"), b"\x89PNG": (b"IEND", "PNG")}
@@ -113,8 +114,10 @@ def dictionary(name: str) -> cv2.aruco.Dictionary:
     return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
 
 
-def tag_detector(name: str, side_px: float = 0.0, image_px: int = 0) -> TagDetector:
-    """Return a detector for one dictionary that leaves corner refinement to its caller.
+def tag_detector(
+    name: str, side_px: float = 0.0, image_px: int = 0, *, refine: bool = False
+) -> TagDetector:
+    """Return a detector for one dictionary; `refine` takes corners to a tenth of a pixel or so.
 
     Where the tag's side is known, given with the longer side of the image, outlines of other sizes
     are not read: most of the time goes into those.
@@ -124,6 +127,10 @@ def tag_detector(name: str, side_px: float = 0.0, image_px: int = 0) -> TagDetec
         perimeter_ratio = 4.0 * side_px / image_px
         settings.minMarkerPerimeterRate = 0.5 * perimeter_ratio
         settings.maxMarkerPerimeterRate = 2.2 * perimeter_ratio
+    if refine:
+        settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        # OpenCV's 0.3 of a cell is a window of 1 px on a small tag and leaves 0.4 px; this, 0.1 px.
+        settings.relativeCornerRefinmentWinSize = CORNER_WINDOW_CELLS
     return cv2.aruco.ArucoDetector(dictionary(name), settings)
 
 
@@ -139,14 +146,19 @@ def detect_tags(detector: TagDetector, image: Image, enlarge: int = 1) -> tuple[
 
     Cells of fewer than some 6 px are read better from the image enlarged by a whole factor.
     """
-    level = grey(image)
-    if enlarge > 1:
-        size = (level.shape[1] * enlarge, level.shape[0] * enlarge)
-        level = np.asarray(cv2.resize(level, size, interpolation=cv2.INTER_CUBIC))
-    corners, found, _ = detector.detectMarkers(level)
+    corners, found, _ = detector.detectMarkers(_enlarged(image, enlarge))
     numbers = ids(found)
     px = points(np.array(corners) if numbers.size else None).reshape(-1, 4, 2)
     return numbers, (px + 0.5) / enlarge - 0.5
+
+
+def _enlarged(image: Image, factor: int) -> Image:
+    """Return the grey image enlarged; pixel p of it is (p + 0.5) / factor - 0.5 of the image."""
+    level = grey(image)
+    if factor == 1:
+        return level
+    size = (level.shape[1] * factor, level.shape[0] * factor)
+    return np.asarray(cv2.resize(level, size, interpolation=cv2.INTER_CUBIC))
 
 
 def dictionary_size(name: str) -> int:
@@ -166,12 +178,12 @@ def charuco_board(columns: int, rows: int, square: float, marker: float, name: s
     return cv2.aruco.CharucoBoard((columns, rows), square, marker, dictionary(name))
 
 
-def detect_charuco(board: CharucoBoard, image: Image) -> tuple[Ids, Array]:
+def detect_charuco(board: CharucoBoard, image: Image, enlarge: int = 1) -> tuple[Ids, Array]:
     """Return the ids (N,) and places (N, 2) of the board's inner corners that are seen."""
     detector = cv2.aruco.CharucoDetector(board)
     detector.setDetectorParameters(_tag_settings())
-    corners, found, _, _ = detector.detectBoard(grey(image))
-    return ids(found), points(corners)
+    corners, found, _, _ = detector.detectBoard(_enlarged(image, enlarge))
+    return ids(found), (points(corners) + 0.5) / enlarge - 0.5
 
 
 def find_chessboard(

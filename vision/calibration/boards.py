@@ -117,12 +117,16 @@ class Charuco:
         )
 
     def find(self, image: Image, name: str = "") -> BoardView | None:
-        """Return the inner corners seen; None for fewer than 6, or all of them in one line."""
-        numbers, px = cv_compat.detect_charuco(self._cv_board, image)
-        points = inner_corners(self.columns, self.rows, self.square_m)[numbers]
-        if len(points) < POINTS_MIN or np.linalg.matrix_rank(points[1:, :2] - points[0, :2]) < 2:
-            return None
-        return BoardView(name, points, px)
+        """Return the inner corners seen; None for fewer than 6, or all of them in one line.
+
+        A board too far away for its tags to be read is looked for in the enlarged image.
+        """
+        for enlarge in (1, 2):
+            numbers, px = cv_compat.detect_charuco(self._cv_board, image, enlarge)
+            points = inner_corners(self.columns, self.rows, self.square_m)[numbers]
+            if len(points) >= POINTS_MIN and np.linalg.matrix_rank(points[1:] - points[0]) == 2:
+                return BoardView(name, points, px)
+        return None
 
     def black(self) -> list[Rect]:
         """Return the black squares and the black cells of every tag."""

@@ -145,11 +145,18 @@ def grow(image: Image, seed_px: Pixel, what: str) -> Mask:
             f" {width} x {height} px"
         )
     seed = np.median(image[v - r : v + r + 1, u - r : u + r + 1].reshape(-1, 3), axis=0)
-    flat = image.reshape(-1, 3).astype(np.float64)
+    if seed.max() < DARK_DN:
+        raise BadInput(
+            f"{what}: too dark at ({u}, {v}): {seed.max():.0f} of 255, limit {DARK_DN:g}; lengthen"
+            " the exposure or add light"
+        )
+    # Noise would make holes: neighbours are averaged to find the patch, not to learn its colour.
+    flat = cv2.blur(image, (3, 3)).reshape(-1, 3).astype(np.float64)
     near = np.abs(chromaticity(flat) - chromaticity(seed[None])).max(axis=1) < GROW_TOLERANCE
     near &= np.abs(flat.sum(axis=1) - seed.sum()) < 0.6 * seed.sum()
     labels = cv2.connectedComponents(near.reshape(height, width).astype(np.uint8))[1]
-    patch: Mask = (labels == labels[v, u]) & (labels[v, u] > 0)
+    under = np.bincount(labels[v - r : v + r + 1, u - r : u + r + 1].ravel())
+    patch: Mask = labels == (1 + int(np.argmax(under[1:])) if len(under) > 1 else -1)
     area = int(patch.sum())
     if not AREA_MIN_PX <= area <= AREA_MAX_RATIO * width * height:
         raise BadInput(
@@ -174,11 +181,6 @@ def _colour(bgr: NDArray[np.uint8], name: str) -> MarkColour:
             f" {CLIPPED_SHARE_MAX:.0%}; shorten the exposure"
         )
     mean = np.median(bgr.astype(np.float64), axis=0)
-    if mean.max() < DARK_DN:
-        raise BadInput(
-            f"colours: the {name} mark is too dark ({mean.max():.0f} of 255, limit {DARK_DN:g});"
-            " lengthen the exposure or add light"
-        )
     chroma = chromaticity(bgr.astype(np.float64))
     centre = np.median(chroma, axis=0)
     covariance = np.cov(chroma.T) + NOISE_FLOOR**2 * np.eye(2)

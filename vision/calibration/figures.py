@@ -55,10 +55,13 @@ def dot(image: Image, px: ArrayLike, colour: Bgr, radius_px: float = 2.5) -> Non
 
 
 def label(image: Image, text: str, at: tuple[int, int], colour: Bgr = WHITE) -> None:
-    """Write a line of text with a dark rim, readable on any ground."""
+    """Write a line of text on a dark strip, readable on any ground."""
     scale = max(0.4, image.shape[1] / 1600.0)
-    for thickness, ink in ((3, BLACK), (1, colour)):
-        cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, scale, ink, thickness, cv2.LINE_AA)
+    font = cv2.FONT_HERSHEY_SIMPLEX
+    (width, height), below = cv2.getTextSize(text, font, scale, 1)
+    corner = (at[0] + width + 2, at[1] + below)
+    cv2.rectangle(image, (at[0] - 2, at[1] - height - 2), corner, BLACK, -1)
+    cv2.putText(image, text, at, font, scale, colour, 1, cv2.LINE_AA)
 
 
 def coverage_picture(calibration: LensCalibration) -> Image:

@@ -74,7 +74,7 @@ def calibrate_floor(
 ) -> FloorCalibration:
     """Return pose, and lens where it is not known, from world-image pairs; raises BadInput."""
     _check_pairs(pairs, size_px, options)
-    fit = _fit(pairs, size_px, options, robust=True)
+    fit = _fit(pairs, _start(pairs, size_px, options), options, robust=True)
     errors_px = np.linalg.norm(fit.camera.project(pairs.world_m) - pairs.px, axis=1)
     spread = 1.4826 * float(np.median(errors_px))
     good = errors_px <= max(OUTLIER_DEVIATIONS * spread, OUTLIER_MIN_PX)
@@ -87,9 +87,9 @@ def calibrate_floor(
     named = zip(pairs.names, errors_mm, good, strict=True)
     dropped = tuple((name, float(error)) for name, error, keep in named if not keep)
     kept = pairs.take(np.flatnonzero(good))
-    fit = _fit(kept, size_px, options)
+    fit = _fit(kept, fit.pinhole, options)
     residual_mm = floor_errors_mm(fit.camera, kept)
-    held_out_mm = _held_out_mm(kept, size_px, options)
+    held_out_mm = _held_out_mm(kept, fit.pinhole, options)
     return FloorCalibration(fit.camera, kept, residual_mm, held_out_mm, dropped, fit.sigma_height_m)
 
 
@@ -124,15 +124,18 @@ def _check_pairs(pairs: PointPairs, size_px: tuple[int, int], options: FloorOpti
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
+    """The camera, the same before its pixel correction, and the doubt of its height."""
+
     camera: CameraModel
+    pinhole: CameraModel
     sigma_height_m: float
 
 
 def _fit(
-    pairs: PointPairs, size_px: tuple[int, int], options: FloorOptions, *, robust: bool = False
+    pairs: PointPairs, start: CameraModel, options: FloorOptions, *, robust: bool = False
 ) -> _Fit:
     """Fit pose (and lens) by the reprojection error, then the pixel correction if wanted."""
-    start = _start(pairs, size_px, options)
+    size_px = (start.width_px, start.height_px)
     own_lens = options.lens is None
 
     def errors(parameters: Array) -> Array:
@@ -149,10 +152,10 @@ def _fit(
     parameters = np.concatenate((np.zeros(6), _lens_parameters(start) if own_lens else np.empty(0)))
     loss = "soft_l1" if robust else "linear"
     result = least_squares(errors, parameters, x_scale="jac", loss=loss, max_nfev=200)
-    camera = _camera(result.x, start, own_lens)
+    camera = pinhole = _camera(result.x, start, own_lens)
     if options.correction_degree:
-        camera = corrected(camera, pairs.world_m, pairs.px, options.correction_degree)
-    return _Fit(camera, _height_sigma(result.jac, result.fun))
+        camera = corrected(pinhole, pairs.world_m, pairs.px, options.correction_degree)
+    return _Fit(camera, pinhole, _height_sigma(result.jac, result.fun))
 
 
 def _height_sigma(jacobian: Array, errors: Array) -> float:
@@ -272,7 +275,7 @@ def _project(camera: CameraModel, world_m: Array) -> Array:
     return np.stack((camera.fx_px * xd + camera.cx_px, camera.fy_px * yd + camera.cy_px), axis=1)
 
 
-def _held_out_mm(pairs: PointPairs, size_px: tuple[int, int], options: FloorOptions) -> Array:
+def _held_out_mm(pairs: PointPairs, start: CameraModel, options: FloorOptions) -> Array:
     """Return each point's error under a fit to the other half; few points are left out singly."""
     count = len(pairs.px)
     if count >= (HALVES_FROM if options.lens is not None else HALVES_FROM_WITH_LENS):
@@ -283,7 +286,7 @@ def _held_out_mm(pairs: PointPairs, size_px: tuple[int, int], options: FloorOpti
     errors = np.full(count, np.nan)
     for fold in folds:
         rest = pairs.take(np.setdiff1d(np.arange(count), fold))
-        errors[fold] = floor_errors_mm(_fit(rest, size_px, options).camera, pairs.take(fold))
+        errors[fold] = floor_errors_mm(_fit(rest, start, options).camera, pairs.take(fold))
     return errors
 
 

@@ -71,7 +71,7 @@ def pairs_of_fiducials(image: Image, name: str, table: Path, dictionary: str) ->
     """Return the centres of tags seen, by a CSV with columns id, x_m, y_m and, if wanted, z_m."""
     rows = read_numbers(table, ("id", "x_m", "y_m"), ("z_m",))
     places = {int(row["id"]): (row["x_m"], row["y_m"], row.get("z_m", 0.0)) for row in rows}
-    found, corners = cv_compat.detect_tags(cv_compat.tag_detector(dictionary), image)
+    found, corners = cv_compat.detect_tags(cv_compat.tag_detector(dictionary, refine=True), image)
     seen = {int(number): centre_of_tag(c) for number, c in zip(found, corners, strict=True)}
     known = [number for number in places if number in seen]
     if not known:
