@@ -150,8 +150,11 @@ def _fit(
         return np.concatenate(rows)
 
     parameters = np.concatenate((np.zeros(6), _lens_parameters(start) if own_lens else np.empty(0)))
-    loss = "soft_l1" if robust else "linear"
-    result = least_squares(errors, parameters, x_scale="jac", loss=loss, max_nfev=200)
+    # The robust pass only tells outliers and is the start of the next.
+    loss, tolerance = ("soft_l1", 1e-3) if robust else ("linear", 1e-8)
+    result = least_squares(
+        errors, parameters, x_scale="jac", loss=loss, ftol=tolerance, max_nfev=200
+    )
     camera = pinhole = _camera(result.x, start, own_lens)
     if options.correction_degree:
         camera = corrected(pinhole, pairs.world_m, pairs.px, options.correction_degree)
