@@ -38,6 +38,10 @@ class Board:
         """Set the program counter, in bytes: how a test lets the program go astray."""
     def memory(self, address: int, size: int) -> bytes:
         """Return a piece of the data space (registers, I/O, RAM)."""
+    def watch(self, trigger: int, address: int, size: int) -> None:
+        """Keep a copy of a piece of RAM after each step in which the byte at `trigger` changed."""
+    def take_watched(self) -> list[bytes]:
+        """Return the copies kept since last asked."""
     def eeprom(self, size: int) -> bytes:
         """Return the first bytes of the EEPROM."""
     def set_eeprom(self, data: bytes) -> None:

@@ -55,3 +55,8 @@ class Pil(Twin):
         elf = firmware if self.build is None else self.build.elf
         self.board = pil_module()(str(elf), "1", setup.robot.board_clock_ppm, eeprom)
         super().__init__(setup, maker, self.board.handle())
+
+    @property
+    def true_counts(self) -> tuple[int, int]:
+        """Counts the wheels have really turned since power-up, (left, right)."""
+        return self._kernel.true_counts

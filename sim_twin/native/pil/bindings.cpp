@@ -90,6 +90,18 @@ NB_MODULE(_pil, m) {
              return bytes_of(b.chip().memory(address, size));
            },
            "address"_a, "size"_a)
+      .def("watch",
+           [](SimavrBoard& b, std::uint32_t trigger, std::uint32_t address, std::uint32_t size) {
+             b.chip().watch(trigger, address, size);
+           },
+           "trigger"_a, "address"_a, "size"_a)
+      .def("take_watched",
+           [](SimavrBoard& b) {
+             nb::list out;
+             for (const auto& piece : b.chip().watched()) out.append(bytes_of(piece));
+             b.chip().watched().clear();
+             return out;
+           })
       .def("eeprom",
            [](SimavrBoard& b, std::uint32_t size) { return bytes_of(b.chip().eeprom(size)); },
            "size"_a)

@@ -52,7 +52,7 @@ class Chip {
   Cycle now() const;
 
   void set_encoder(int side, std::uint8_t ab);            // now
-  void set_encoder_at(Cycle at, int side, std::uint8_t ab);  // in time order
+  void set_encoder_at(Cycle at, int side, std::uint8_t ab);  // in time order of each side
   void set_battery(double battery_v);                     // at the robot's terminals
   void receive(Cycle start, std::uint8_t byte);           // start bit at that cycle, in order
   void drop_line();                                       // what is still on its way is lost
@@ -65,6 +65,9 @@ class Chip {
   std::string eeprom(std::uint32_t size) const;
   void set_eeprom(const std::string& bytes);
   int stack_used() const;             // deepest since power-up, bytes
+  // Keeps a copy of a piece of RAM whenever the byte at `trigger` has changed between two runs.
+  void watch(std::uint32_t trigger, std::uint32_t address, std::uint32_t size);
+  std::vector<std::string>& watched() { return watched_; }
   const Usage& usage() const { return usage_; }
   Profiler& profiler() { return profiler_; }
   const std::vector<std::string>& complaints() const { return complaints_; }
@@ -92,7 +95,7 @@ class Chip {
 
   static Cycle on_edges(avr_t*, Cycle when, void* self);
   static Cycle on_incoming(avr_t*, Cycle when, void* self);
-  static Cycle on_barrier(avr_t*, Cycle, void*) { return 0; }
+  static Cycle on_barrier(avr_t* avr, Cycle, void*);
   static void on_interrupt(avr_irq_t* irq, std::uint32_t running, void* self);
   static void on_output(avr_irq_t* irq, std::uint32_t byte, void* self);
   static void on_sleep(avr_t* avr, Cycle cycles);
@@ -117,6 +120,9 @@ class Chip {
   Cycle sent_done_ = 0;
   Cycle interrupt_from_ = 0;
   bool interrupted_ = false;
+  std::uint32_t watch_trigger_ = 0, watch_address_ = 0, watch_size_ = 0;
+  std::uint8_t watch_last_ = 0;
+  std::vector<std::string> watched_;
   Usage usage_;
   Profiler profiler_;
   std::vector<std::string> complaints_;
