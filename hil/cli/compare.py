@@ -24,10 +24,11 @@ def command(runs: tuple[Path, ...], report: Path | None, as_json: bool) -> None:
     from hil.record.manifest import command_line
     from hil.record.reader import read_run
     from hil.report.compare import compare_runs, to_json
-    from hil.report.html import write_report
 
     comparison = compare_runs([read_run(run) for run in runs])
     if report is not None:
+        from hil.report.html import write_report
+
         write_report(report, [comparison], command=command_line())
     if as_json:
         print_json(to_json(comparison))

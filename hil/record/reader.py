@@ -70,20 +70,26 @@ class RunRecord:
         """Return the verdict on each requirement of the scenario."""
         return metrics.check(self.figures(), self.manifest.scenario)
 
+    def pictures_from_start(self) -> tuple[Picture, ...]:
+        """Return the pictures from the last one before the first tick on (the robot at rest)."""
+        before = sum(picture.t_s <= 0.0 for picture in self.pictures)
+        return self.pictures[max(before - 1, 0) :]
+
     def moments(self) -> dict[str, Picture]:
         """Return the picture at the start, at half of the way travelled, and at the end."""
-        if not self.pictures:
+        pictures = self.pictures_from_start()
+        if not pictures:
             return {}
-        chosen = {"start": self.pictures[0]}
+        chosen = {"start": pictures[0]}
         who = "true" if metrics.has_truth(self.samples) else "est"
         x_m, y_m = self.samples[f"{who}_x_m"], self.samples[f"{who}_y_m"]
         steps_m = np.hypot(np.diff(x_m), np.diff(y_m))
         way_m = np.cumsum(np.nan_to_num(steps_m))
-        if way_m.size and len(self.pictures) > 2:
+        if way_m.size and len(pictures) > 2:
             half_s = float(self.samples["t_s"][1:][np.searchsorted(way_m, way_m[-1] / 2)])
-            between = self.pictures[1:-1]
+            between = pictures[1:-1]
             chosen["middle"] = min(between, key=lambda picture: abs(picture.t_s - half_s))
-        return chosen | {"end": self.pictures[-1]}
+        return chosen | {"end": pictures[-1]}
 
 
 def read_run(path: Path) -> RunRecord:

@@ -1,7 +1,8 @@
 """`run.rrd`: one or several runs as a Rerun recording with its blueprint, on one timeline `t`.
 
 Each run stands under an entity of its own. The floor plan keeps the world frame (X right, Y up,
-seen from above); times are seconds since the start of the controlled part.
+seen from above). Times are seconds since the first tick of the controlled part; what came before it
+(connecting, the robot found at rest) stands at t = 0, for the viewer shows no image at negative times.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ _RUN_COLOURS = {"pid": (0, 114, 178), "asg-ism": (213, 94, 0)}
 _OTHER_COLOURS = ((0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233))
 _LINE_COLOURS = ((230, 230, 230), (86, 180, 233), (230, 159, 0), (0, 158, 115))
 _GREY = (140, 140, 140)
-_RED, _BLUE = (214, 68, 60), (60, 120, 216)
+_FRONT, _REAR = (255, 255, 255), (255, 221, 0)
 _MARKS = ("front_u_px", "front_v_px", "rear_u_px", "rear_v_px")
 _GRAVE = {"fault", "stop"}
 _EYE_HALF_ANGLE_RAD = math.radians(27.0)
@@ -206,8 +207,8 @@ class _Sender:
         self._recording.send_columns(f"{self._name}/{plot.key}", self._ticks, values)
 
     def _camera(self) -> None:
-        pictures, frames = self._run.pictures, self._run.frames
-        time = [rr.TimeColumn(TIMELINE, duration=[picture.t_s for picture in pictures])]
+        pictures, frames = self._run.pictures_from_start(), self._run.frames
+        time = [rr.TimeColumn(TIMELINE, duration=[max(item.t_s, 0.0) for item in pictures])]
         blobs = [picture.path.read_bytes() for picture in pictures]
         images = rr.EncodedImage.columns(blob=blobs, media_type=["image/jpeg"] * len(blobs))
         self._recording.send_columns(f"{self._name}/camera/image", time, images)
@@ -220,7 +221,7 @@ class _Sender:
         rows = [int(np.abs(frames["t_arrival_s"] - t_s).argmin()) for t_s in picture_times_s]
         marks = np.column_stack([frames[key][rows] for key in _MARKS])
         found = np.isfinite(marks).all(axis=1)
-        style = rr.Points2D.from_fields(colors=[_RED, _BLUE], radii=4.0)
+        style = rr.Points2D.from_fields(colors=[_FRONT, _REAR], radii=4.0)
         self._log_static("camera/image/marks", style)
         positions = rr.Points2D.columns(positions=marks[found].reshape(-1, 2))
         pairs = positions.partition(np.where(found, 2, 0))
@@ -228,8 +229,8 @@ class _Sender:
 
     def _events(self) -> None:
         events = self._run.events
-        time = [rr.TimeColumn(TIMELINE, duration=[event.t_s for event in events])]
-        text = [f"{event.kind}: {event.text}" for event in events]
+        time = [rr.TimeColumn(TIMELINE, duration=[max(event.t_s, 0.0) for event in events])]
+        text = [f"{event.t_s:.2f} s  {event.kind}: {event.text}" for event in events]
         level = ["WARN" if event.kind in _GRAVE else "INFO" for event in events]
         lines = rr.TextLog.columns(text=text, level=level)
         self._recording.send_columns(f"{self._name}/events", time, lines)

@@ -75,6 +75,7 @@ def render(
         "summary": _summary(comparisons),
         "parts": [_part(comparison) for comparison in comparisons],
         "circle": _circle(circle) if circle is not None else None,
+        "metrics": METRICS,
         "conditions": _conditions(comparisons),
         "command": command,
         "provenance": _provenance(comparisons),
@@ -179,7 +180,6 @@ def _part(comparison: Comparison) -> Context:
                 "label": metric.label,
                 "cells": _cells(comparison, metric.name),
                 "unit": metric.shown_unit,
-                "definition": metric.definition,
             }
             for metric in METRICS
         ],
@@ -234,7 +234,11 @@ def _photos(comparison: Comparison, colours: Sequence[int]) -> list[Context]:
     for entry, colour in zip(comparison.entries, colours, strict=True):
         moments = entry.run.moments()
         photos = [
-            {"moment": moment, "time": f"{picture.t_s:.1f}", "uri": _data_uri(picture.path)}
+            {
+                "moment": moment,
+                "time": f"{max(picture.t_s, 0.0):.1f}",
+                "uri": _data_uri(picture.path),
+            }
             for moment, picture in moments.items()
         ]
         if photos:

@@ -219,6 +219,22 @@ def test_pictures_start_middle_end(tmp_path):
     assert len(run.pictures) == 9
 
 
+def test_start_picture_is_the_last_one_at_rest(tmp_path):
+    """Frames come before the first tick too; the start is the one nearest before it."""
+    recorder = Recorder(tmp_path / "run", manifest(), rerun=False)
+    given = rows("pid", 1, duration_s=1.0)
+    for index, t_s in enumerate((-1.2, -0.6, -0.1, 0.5, 1.0)):
+        recorder.frame(frame_row(t_s, index, given[0]), image_of(frame_row(t_s, index, given[0])))
+    for row in given:
+        recorder.append(row)
+    moments = recorder.close("complete").moments()
+    assert {name: picture.t_s for name, picture in moments.items()} == {
+        "start": -0.6,  # -0.1 came less than 0.5 s after it and was not kept
+        "middle": 0.5,
+        "end": 1.0,
+    }
+
+
 def test_video_is_lossless_and_stamped(tmp_path):
     """--record-camera keeps every frame as it was, one row of frames.parquet for each."""
     recorder = Recorder(tmp_path / "run", manifest(), record_camera=True, rerun=False)
