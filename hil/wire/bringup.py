@@ -153,6 +153,11 @@ def disarm(link: BoardLink) -> Procedure:
     yield from _command(link, "disarm", dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
 
 
+def store(link: BoardLink) -> Procedure:
+    """Keep the parameters in force in the board's EEPROM."""
+    yield from _command(link, "store", dialect.MAV_CMD_PREFLIGHT_STORAGE, 1.0)
+
+
 def _wait(
     link: BoardLink, done: Callable[[], bool], timeout_s: float
 ) -> Generator[None, None, bool]:
