@@ -76,13 +76,16 @@ def new_folder(stem: str) -> Path:
     return folder
 
 
-def execute(spec: RunSpec, progress: Progress | None = None) -> RunRecord:
-    """Run the spec and return its closed record; raises BadInput before anything is written."""
+def execute(spec: RunSpec, progress: Progress | None = None, rig: Rig | None = None) -> RunRecord:
+    """Run the spec and return its closed record; raises BadInput before anything is written.
+
+    `rig` is another one than the spec's target names; it is closed here.
+    """
     cv2.setNumThreads(
         1
     )  # search windows are small: handing them to threads costs more than it saves
     parameters = board_parameters(spec.scenario, spec.inner)
-    rig = open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
+    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
     try:
         recorder = Recorder(
             spec.out,

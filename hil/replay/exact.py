@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from hil.config.load import build, check_board, set_value
 from hil.config.scenario import Scenario
-from hil.errors import BadInput
+from hil.errors import BadInput, RigFault
 from hil.record import layout
 from hil.record.manifest import Manifest, read_manifest
 from hil.record.memory import MemoryRecorder
@@ -176,7 +176,10 @@ def replay(
     parts = replace(parts, law=shadow or parts.law)
     # The board's parameters are in the record whatever is changed here.
     parameters = board_parameters(recorded, source.manifest.inner)
-    ending = Session(scenario, parts, parameters, board_hashes, progress).run()
+    try:
+        ending = Session(scenario, parts, parameters, board_hashes, progress).run()
+    except RigFault as fault:  # the record ended after the session's own handling of faults
+        ending = Ending("fault", str(fault))
     record = recorder.close(ending.outcome, ending.detail)
     samples = record.samples
     if shadow is not None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import cv2
 import numpy as np
@@ -52,11 +52,13 @@ class ReplayRig:
             self._begin_instant()
 
     def now_s(self) -> float:
-        """Return what the host clock showed."""
+        """Return what the host clock showed; RigFault once, when the record ends here."""
         if self._fresh:
             self._fresh = False
         elif self._kind() == tape.CLOCK:
             self._now_s = float(self._take())
+        elif self._kind() == b"" and not self.ended:
+            self._end()
         return self._now_s
 
     def wait(self, until_s: float) -> None:  # noqa: ARG002 - the record knows how long it took
@@ -65,8 +67,7 @@ class ReplayRig:
             self.raise_recorded()
             self._at += 1
         if self._kind() == b"":
-            self.ended = True
-            raise RigFault(END)
+            self._end()
         self._begin_instant()
 
     def poll_frame(self) -> Frame | None:
@@ -106,6 +107,10 @@ class ReplayRig:
             self._at += 1
             raise KeyboardInterrupt
 
+    def _end(self) -> NoReturn:
+        self.ended = True
+        raise RigFault(END)
+
     def _begin_instant(self) -> None:
         self._now_s = float(self._take())
         self._fresh = True
@@ -130,8 +135,10 @@ class _ReplayStream:
         return self._rig.take_bytes()
 
     def write(self, data: bytes) -> None:  # noqa: ARG002 - see the module
-        """Send nowhere, and fail where the recorded port failed."""
+        """Send nowhere; fail where the recorded port failed, and after the record's end."""
         self._rig.raise_recorded()
+        if self._rig.ended:
+            raise RigFault(END)
 
 
 def recorded_frames(frames: Columns, images: Iterator[NDArray[np.uint8]]) -> Iterator[Frame]:
