@@ -200,9 +200,18 @@ def findings(comparison: Comparison) -> list[str]:
     equal = len(HEADLINES) - sum(wins.values())
     lines.append(
         f"Better of {len(HEADLINES)} headline figures: {score}, no clear difference in {equal}. "
-        "One run each, so these differences carry no interval: repeats are needed to be sure."
+        f"{_certainty(comparison)}"
     )
     return lines
+
+
+def _certainty(comparison: Comparison) -> str:
+    laws = [entry.run.manifest.outer for entry in comparison.entries]
+    if len(set(laws)) == len(laws):
+        return (
+            "One run each, so these differences carry no interval: repeats are needed to be sure."
+        )
+    return "Runs of one law are listed apart, not averaged; the differences carry no interval."
 
 
 def _factor(metric: Metric, values: Sequence[float], index: int) -> str:
