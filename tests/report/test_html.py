@@ -148,16 +148,16 @@ def test_circle_findings_are_computed_and_honest():
 def test_report_that_cannot_be_written_is_one_clear_line(comparisons, tmp_path):
     """A folder that is not there: one line, and nothing half-written anywhere."""
     with pytest.raises(BadInput, match="cannot be written: No such file"):
-        write_report(tmp_path / "nowhere" / "r.html", comparisons, command="x")
-    write_report(tmp_path / "r.html", comparisons, command="x")
+        write_report(tmp_path / "nowhere" / "r.html", comparisons[:1], command="x")
+    write_report(tmp_path / "r.html", comparisons[:1], command="x")
     assert [path.name for path in tmp_path.iterdir()] == ["r.html"]
 
 
 def test_report_is_fast(comparisons):
-    """Two scenarios are drawn in a few seconds even on a busy machine."""
-    start_s = time.perf_counter()
-    render(comparisons, command="x")
-    assert time.perf_counter() - start_s < 6.0
+    """A scenario costs at most a second and a half of processor time: three fit in 6 s easily."""
+    start_s = time.process_time()
+    render(comparisons[:1], command="x")
+    assert time.process_time() - start_s < 1.5
 
 
 def test_assumptions_carry_unit_meaning_and_source():
