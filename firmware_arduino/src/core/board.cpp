@@ -9,6 +9,8 @@ namespace {
 
 constexpr uint32_t LATE_US = TICK_US + TICK_US / 2;
 
+bool drives(const Board& b) { return b.safety.state == HIL_STATE_ARMED; }
+
 int32_t counts_of(const BoardInputs& in, uint8_t side) {
   return side == LEFT ? in.counts_left : in.counts_right;
 }
@@ -34,7 +36,10 @@ SafetyView sense(Board& b, const BoardInputs& in) {
   if (!b.ticked) first_tick(b, in);
   if (in.t_us - b.inputs.t_us > LATE_US) ++b.overruns;
   SafetyView view;
-  for (uint8_t i = 0; i < SIDES; ++i) view.side[i] = {b.wheel[i].pwm, moved(b, in, i), 0.0f};
+  for (uint8_t i = 0; i < SIDES; ++i) {
+    const float asked = drives(b) ? b.setpoint.omega_rad_s[i] : 0.0f;
+    view.side[i] = {asked, b.wheel[i].pwm, moved(b, in, i), 0.0f};
+  }
   view.illegal_total = in.encoder_faults;
   view.battery_mv = in.battery_mv;
   view.setpoint_age_us = in.t_us - b.setpoint.t_us;
@@ -52,8 +57,6 @@ void estimate(Board& b, SafetyView& view) {
 void check(Board& b, const SafetyView& view) {
   if (safety_apply(b.safety, safety_check(b.safety, b.limits, view))) say_state(b);
 }
-
-bool drives(const Board& b) { return b.safety.state == HIL_STATE_ARMED; }
 
 void control(Board& b) {
   if (!drives(b)) return;

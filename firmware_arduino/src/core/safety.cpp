@@ -1,3 +1,5 @@
+#include "fast.h"
+
 #include "safety.h"
 
 #include <math.h>
@@ -41,7 +43,8 @@ bool runs_away(uint16_t& ticks, const SideView& v, const SafetyLimits& limits) {
 
 bool stalls(uint16_t& ticks, const SideView& v, const SafetyLimits& limits) {
   const bool pushed = v.pwm >= limits.stall_pwm || v.pwm <= -limits.stall_pwm;
-  return lasts(ticks, pushed && v.moved_counts == 0, limits.stall_ticks);
+  const bool asked = fabsf(v.setpoint_rad_s) >= limits.stall_setpoint_rad_s;
+  return lasts(ticks, (pushed || asked) && v.moved_counts == 0, limits.stall_ticks);
 }
 
 void check_battery(Safety& s, const SafetyLimits& limits, uint16_t battery_mv) {
@@ -94,6 +97,7 @@ SafetyLimits safety_limits(const Params& p) {
   l.overspeed_ticks = ticks_of(p.overspeed_ms);
   l.stall_pwm = static_cast<int16_t>(p.stall_duty * PWM_TOP);
   l.runaway_pwm = static_cast<int16_t>(p.runaway_duty * PWM_TOP);
+  l.stall_setpoint_rad_s = p.stall_setpoint_rad_s;
   l.overspeed_rad_s = p.overspeed_rad_s;
   l.illegal_per_s = static_cast<uint16_t>(p.illegal_per_s);
   return l;

@@ -33,13 +33,16 @@ struct SafetyLimits {
   uint16_t battery_low_mv, battery_good_mv, battery_ticks;
   uint16_t stall_ticks, runaway_ticks, overspeed_ticks;
   int16_t stall_pwm, runaway_pwm;
+  float stall_setpoint_rad_s;
   float overspeed_rad_s;
   uint16_t illegal_per_s;
 };
 SafetyLimits safety_limits(const Params& params);
 
-// One side as the checks see it: PWM applied since the last tick, counts moved under it, speed.
+// One side as the checks see it: set-point and PWM in force since the last tick, counts moved under
+// them, speed.
 struct SideView {
+  float setpoint_rad_s;  // 0 unless armed
   int16_t pwm;
   int16_t moved_counts;
   float omega_rad_s;

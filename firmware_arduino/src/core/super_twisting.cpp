@@ -1,6 +1,10 @@
+#include "fast.h"
+
 #include "super_twisting.h"
 
 #include <math.h>
+
+#include "flt.h"
 
 namespace hil {
 
@@ -15,39 +19,35 @@ struct Correction {
 
 // Distance of x to the cell [-cell, cell], signed.
 float outside(float x, float cell) {
-  if (x > cell) return x - cell;
-  if (x < -cell) return x + cell;
-  return 0.0f;
+  const float size = fabsf(x);
+  return size > cell ? copysignf(size - cell, x) : 0.0f;
 }
 
 // Root and sign at the old error, as forward Euler reads.
 Correction explicit_euler(float error, const SuperTwistingSteps& st) {
-  if (error > 0.0f) return {st.root * sqrtf(error), 1.0f};
-  if (error < 0.0f) return {-st.root * sqrtf(-error), -1.0f};
-  return {0.0f, 0.0f};
+  return {with_sign(st.root * sqrtf(fabsf(error)), error), with_sign(1.0f, error)};
 }
 
 // Root of the predicted error, but never past zero; the sign fades in proportion over the same zone.
 Correction semi_implicit(float predicted, const SuperTwistingSteps& st) {
   const float size = fabsf(predicted);
   if (size <= st.root_sq) return {predicted, predicted / st.root_sq};
-  const float root = st.root * sqrtf(size);
-  return predicted > 0.0f ? Correction{root, 1.0f} : Correction{-root, -1.0f};
+  return {copysignf(st.root * sqrtf(size), predicted), copysignf(1.0f, predicted)};
 }
 
 // Backward Euler: solves e + root |e|^(1/2) sgn e + sign sgn e = predicted, with sgn set-valued at 0.
 Correction implicit_euler(float predicted, const SuperTwistingSteps& st) {
   const float size = fabsf(predicted);
   if (size <= st.sign) return {predicted, predicted / st.sign};
-  const float y = 0.5f * (sqrtf(st.root_sq + 4.0f * (size - st.sign)) - st.root);
-  const float taken = size - y * y;
-  return predicted > 0.0f ? Correction{taken, 1.0f} : Correction{-taken, -1.0f};
+  const float y = sqrtf(st.quarter_root_sq + (size - st.sign)) - st.half_root;
+  return {copysignf(size - y * y, predicted), copysignf(1.0f, predicted)};
 }
 
 SuperTwistingSteps steps_for(const SuperTwistingGains& g, float l) {
   const float root = g.dt_s * g.l1 * sqrtf(l);
   const float slope = g.dt_s * g.l0 * l;
-  return {root, root * root, g.dt_s * slope, slope};
+  const float half = 0.5f * root;
+  return {root, root * root, half, half * half, g.dt_s * slope, slope};
 }
 
 // (3.15): L grows while the equivalent sign shows that it barely suffices, and shrinks otherwise.
@@ -89,7 +89,8 @@ void super_twisting_reset(SuperTwisting& st, const SuperTwistingGains& gains) {
 }
 
 float super_twisting_step(SuperTwisting& st, const SuperTwistingGains& g, float dx) {
-  const SuperTwistingSteps steps = g.variable ? steps_for(g, st.l) : g.steps;
+  const SuperTwistingSteps varied = g.variable ? steps_for(g, st.l) : SuperTwistingSteps{};
+  const SuperTwistingSteps& steps = g.variable ? varied : g.steps;
   const float predicted = st.error + g.dt_s * st.x2 - dx;
   Correction c;
   if (g.scheme == Scheme::EXPLICIT) {

@@ -12,6 +12,7 @@ enum class Scheme : uint8_t { EXPLICIT = 0, SEMI_IMPLICIT = 1, IMPLICIT = 2 };
 struct SuperTwistingSteps {
   float root;     // dt l1 sqrt(L): weight of |e|^(1/2) in x1
   float root_sq;  // its square
+  float half_root, quarter_root_sq;
   float sign;     // dt^2 l0 L: what the sign term does to x1 through x2 in one step
   float slope;    // dt l0 L: what the sign term takes off x2
 };

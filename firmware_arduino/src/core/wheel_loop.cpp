@@ -1,20 +1,17 @@
+#include "fast.h"
+
 #include "wheel_loop.h"
 
 #include <math.h>
 
 #include "constants.h"
+#include "flt.h"
 
 namespace hil {
 
 namespace {
 
 constexpr float TWO_PI_RAD = 6.2831853f;
-
-// value * sgn(x)
-float with_sign(float value, float x) {
-  if (x > 0.0f) return value;
-  return x < 0.0f ? -value : 0.0f;
-}
 
 float clamp(float x, float limit) {
   if (x > limit) return limit;
@@ -192,8 +189,9 @@ void wheel_control(Wheel& w, const WheelTuning& t, float setpoint_rad_s) {
 }
 
 void wheel_limit(Wheel& w, const WheelTuning& t) {
-  const float wanted = clamp(w.duty, 4.0f) * PWM_TOP;  // within int16 whatever the law says
-  int16_t pwm = static_cast<int16_t>(wanted + (wanted >= 0.0f ? 0.5f : -0.5f));
+  constexpr float FAR = 4.0f;  // within int16 whatever the law says
+  const float duty = fabsf(w.duty) <= FAR ? w.duty : clamp(w.duty, FAR);
+  int16_t pwm = static_cast<int16_t>(lroundf(duty * PWM_TOP));
   const int16_t asked = pwm;
   if (pwm > w.pwm + t.slew_counts) pwm = static_cast<int16_t>(w.pwm + t.slew_counts);
   if (pwm < w.pwm - t.slew_counts) pwm = static_cast<int16_t>(w.pwm - t.slew_counts);
