@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Figures = Mapping[str, float]
 # (outer law, gains, case, seed) -> figures of the run, named as in metrics.json
-Evaluate = Callable[[str, Gains, str, int], Figures]
+Evaluate = Callable[[str, Gains, "Case", int], Figures]
 # (outer law, candidates done, candidates in all, best cost so far)
 Progress = Callable[[str, int, int, float], None]
 
@@ -54,7 +54,7 @@ SEARCH: dict[str, dict[str, tuple[float, float, float]]] = {
 }
 
 
-# What pushes the robot in a case named "<scenario>/pushed": a tenth of the robot's weight along its
+# What pushes the robot in a pushed case: a tenth of the robot's weight along its
 # way and a twist of the same order about the vertical, at rates inside the loop's bandwidth.
 PUSHES = (
     Disturbance(target="force_forward_n", shape="sine", amplitude=3.0, frequency_hz=0.4),
@@ -62,13 +62,29 @@ PUSHES = (
         target="torque_yaw_n_m", shape="sine", amplitude=0.15, frequency_hz=0.3, phase_rad=1.0
     ),
 )
-CASES = (
-    "scenario-1",
-    "scenario-2",
-    "scenario-3",
-    "scenario-1/pushed",
-    "scenario-2/pushed",
-    "scenario-3/pushed",
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One run that every candidate makes: a scenario, calm or pushed, over a wheel law."""
+
+    scenario: str
+    inner: str
+    pushed: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.scenario}/{self.inner}{'/pushed' if self.pushed else ''}"
+
+
+CASES = tuple(
+    Case(scenario, inner, pushed)
+    for scenario, pushed in (
+        ("scenario-1", False),
+        ("scenario-3", False),
+        ("scenario-2", True),
+        ("scenario-3", True),
+    )
+    for inner in ("asg-ism", "pid")
 )
 
 
@@ -76,7 +92,7 @@ CASES = (
 class Plan:
     """What both laws are given alike."""
 
-    cases: tuple[str, ...] = CASES
+    cases: tuple[Case, ...] = CASES
     seeds: tuple[int, ...] = (1,)
     candidates: int = 300
     population: int = 10
@@ -174,7 +190,7 @@ def tune(
         "procedure": "hil.tune: CMA-ES on log gains, see docs/control.md",
         "target": target,
         "revision": revision,
-        "cases": ", ".join(plan.cases),
+        "cases": ", ".join(map(str, plan.cases)),
         "seeds": ", ".join(map(str, plan.seeds)),
         "population": plan.population,
         "search_seed": plan.search_seed,
@@ -200,28 +216,27 @@ def write_gain_set(path: Path, gains: Gains) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def case_scenario(case: str, gains: Gains) -> Scenario:
+def case_scenario(case: Case, gains: Gains) -> Scenario:
     """Return the scenario of a case with `gains` as its tuned set."""
-    name, _, variant = case.partition("/")
-    scenario = load_scenario(name)
+    scenario = load_scenario(case.scenario)
     sets = scenario.control.gains.model_copy(update={"tuned": gains})
     control = scenario.control.model_copy(update={"gains": sets, "gain_set": "tuned"})
-    pushes = PUSHES if variant == "pushed" else scenario.disturbances
+    pushes = PUSHES if case.pushed else scenario.disturbances
     return scenario.model_copy(update={"control": control, "disturbances": pushes})
 
 
-def evaluate_on(target: str, camera: str, inner: str) -> Evaluate:
+def evaluate_on(target: str, camera: str) -> Evaluate:
     """Return an `evaluate` that runs the case on a target; a run that ends early has no figures."""
     from hil.run import RunSpec, execute  # noqa: PLC0415 - the search itself needs no target
 
-    def evaluate(outer: str, gains: Gains, case: str, seed: int) -> Figures:
+    def evaluate(outer: str, gains: Gains, case: Case, seed: int) -> Figures:
         with TemporaryDirectory(prefix="hil-tune-") as folder:
             spec = RunSpec(
                 scenario=case_scenario(case, gains),
                 target=target,
                 camera=camera,
                 outer=outer,
-                inner=inner,
+                inner=case.inner,
                 seed=seed,
                 out=Path(folder) / "run",
                 rerun=False,

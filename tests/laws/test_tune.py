@@ -12,6 +12,7 @@ from hil.tune import (
     COST_FAILED,
     PUSHES,
     SEARCH,
+    Case,
     Plan,
     case_scenario,
     decode,
@@ -22,7 +23,8 @@ from hil.tune import (
 )
 
 BASE = ControlConfig().active_gains
-PLAN = Plan(cases=("a", "b"), seeds=(1, 2), candidates=121, population=10)
+A, B = Case("a", "pid"), Case("b", "pid")
+PLAN = Plan(cases=(A, B), seeds=(1, 2), candidates=121, population=10)
 # Where the made-up cost below has its least value.
 BEST = {"k1_s": 0.5, "sigma_m_s2": 0.1, "kp_s3": 40.0, "kd2_s": 20.0}
 
@@ -35,7 +37,7 @@ def distance(outer, gains):
 def bowl(outer, gains, case, seed):
     """Figures of a run whose error grows with the distance of the gains from BEST."""
     return {
-        "itae_m_s2": 1.0 + distance(outer, gains) + (case == "b") + 0.1 * seed,
+        "itae_m_s2": 1.0 + distance(outer, gains) + (case == B) + 0.1 * seed,
         "eta1_variation_m_s": 0.0,
         "theta_dot_variation_rad_s": 0.0,
     }
@@ -73,7 +75,7 @@ def test_it_finds_the_least_of_a_bowl(tuned):
 
 def test_the_search_is_repeatable():
     """The same plan gives the same gains, bit for bit."""
-    plan = Plan(cases=("a",), seeds=(1,), candidates=41)
+    plan = Plan(cases=(A,), seeds=(1,), candidates=41)
     runs = [tune(BASE, bowl, plan, target="bowl", revision="none") for _ in range(2)]
     assert runs[0] == runs[1]
 
@@ -109,4 +111,4 @@ def test_cases_are_scenarios_calm_and_pushed():
     for case in CASES:
         scenario = case_scenario(case, gains)
         assert scenario.control.active_gains.pid.kp_s3 == 12.5
-        assert scenario.disturbances == (PUSHES if case.endswith("/pushed") else ())
+        assert scenario.disturbances == (PUSHES if case.pushed else ())
