@@ -233,19 +233,35 @@ def test_a_dead_encoder_stops_the_robot(side, law):
     assert (bench.board.state, bench.board.reason) == (SAFE, expected)
 
 
+@pytest.mark.parametrize("asked", [0.3, -4.0, 11.0])
+@pytest.mark.parametrize("law", [0.0, 1.0])
 @pytest.mark.parametrize("side", [0, 1])
-def test_swapped_phases_stop_the_robot(side):
-    """One side counts against its PWM: RUNAWAY of that side within half a second."""
-    bench, wheels = armed(), motors()
-    for tick in range(125):
+def test_swapped_phases_stop_the_robot(side, law, asked):
+    """One side counts against its PWM: RUNAWAY of that side within 0.7 s, crawl or full speed."""
+    bench, wheels = BoardBench(), motors()
+    bench.set_param("LAW", law)
+    assert bench.arm() == ACCEPTED
+    for tick in range(175):
         if tick % 8 == 0:
-            bench.setpoint(4.0)
+            bench.setpoint(asked)
         bench.counts = [-m.counts if i == side else m.counts for i, m in enumerate(wheels)]
         bench.tick()
         for motor, pwm in zip(wheels, bench.pwm, strict=True):
             motor.turn(pwm)
     expected = (dialect.HIL_REASON_RUNAWAY_LEFT, dialect.HIL_REASON_RUNAWAY_RIGHT)[side]
     assert (bench.board.state, bench.board.reason) == (SAFE, expected)
+
+
+def test_a_dragged_wheel_may_brake():
+    """The outer side of a turn drags the inner one along: 3 s of braking near the set-point."""
+    bench, wheels = BoardBench(), motors(dead=0.05)
+    bench.set_param("LAW", 1.0)
+    assert bench.arm() == ACCEPTED
+    for motor in wheels:
+        motor.load = -0.4
+    bench.run(wheels, 750, setpoint=0.5)
+    assert bench.pwm[0] < -100
+    assert bench.board.state == ARMED
 
 
 def test_hard_driving_trips_nothing():

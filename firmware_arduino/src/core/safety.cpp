@@ -38,7 +38,9 @@ bool against(const SideView& v) { return (v.pwm > 0) == (v.moved_counts < 0); }
 bool runs_away(uint16_t& ticks, const SideView& v, const SafetyLimits& limits) {
   const bool pushed = v.pwm >= limits.runaway_pwm || v.pwm <= -limits.runaway_pwm;
   if (pushed && v.moved_counts == 0) return false;
-  return lasts(ticks, pushed && against(v), limits.runaway_ticks);
+  const bool lost = pushed && against(v) &&
+                    fabsf(v.omega_rad_s - v.setpoint_rad_s) >= limits.runaway_error_rad_s;
+  return lasts(ticks, lost, limits.runaway_ticks);
 }
 
 bool stalls(uint16_t& ticks, const SideView& v, const SafetyLimits& limits) {
@@ -98,6 +100,7 @@ SafetyLimits safety_limits(const Params& p) {
   l.stall_pwm = static_cast<int16_t>(p.stall_duty * PWM_TOP);
   l.runaway_pwm = static_cast<int16_t>(p.runaway_duty * PWM_TOP);
   l.stall_setpoint_rad_s = p.stall_setpoint_rad_s;
+  l.runaway_error_rad_s = p.runaway_error_rad_s;
   l.overspeed_rad_s = p.overspeed_rad_s;
   l.illegal_per_s = static_cast<uint16_t>(p.illegal_per_s);
   return l;

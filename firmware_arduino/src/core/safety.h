@@ -34,6 +34,7 @@ struct SafetyLimits {
   uint16_t stall_ticks, runaway_ticks, overspeed_ticks;
   int16_t stall_pwm, runaway_pwm;
   float stall_setpoint_rad_s;
+  float runaway_error_rad_s;
   float overspeed_rad_s;
   uint16_t illegal_per_s;
 };
