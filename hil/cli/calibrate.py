@@ -432,3 +432,34 @@ def _sample(image: Path | None, front: str | None, rear: str | None) -> Sample:
         _numbers(text, 2, name, "312,207") for name, text in (("--front", front), ("--rear", rear))
     ]
     return Sample(image.name, read_image(image), (at[0][0], at[0][1]), (at[1][0], at[1][1]))
+
+
+@command.command()
+@click.argument("index", type=click.IntRange(0, 99))
+@file_option
+@click.option("--light", "light_s", type=click.FloatRange(0.0, 0.2), default=0.0, show_default=True,
+              metavar="S", help="What the screen itself takes, subtracted.")  # fmt: skip
+@json_option
+def latency(index: int, camera_file: Path, light_s: float, as_json: bool) -> None:
+    """Measure frame rate and exposure-to-host latency with this terminal as the light.
+
+    Point camera INDEX at the screen so that the terminal fills the middle of the image; it turns
+    white and black for some 12 seconds.
+    """
+    from vision.calibration import files
+    from vision.calibration.latency import measure_latency
+    from vision.calibration.screen import watch_blinking_terminal
+
+    files.read_camera(camera_file)
+    edges_s, arrivals_s, levels_dn = watch_blinking_terminal(index)
+    found = measure_latency(edges_s, arrivals_s, levels_dn)
+    values = {"rate_hz": found.rate_hz, "latency_s": max(0.0, found.latency_s - light_s)}
+    files.update_camera(camera_file, [files.Table("", values)])
+    if as_json:
+        print_json({"camera_file": str(camera_file), **values, "sigma_s": found.sigma_s})
+        return
+    click.echo(
+        f"latency {values['latency_s'] * 1e3:.1f} ms (sigma {found.sigma_s * 1e3:.1f}), frames at"
+        f" {found.rate_hz:.2f} Hz; {light_s * 1e3:g} ms taken off for the screen\n"
+        f"written to {camera_file}"
+    )

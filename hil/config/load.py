@@ -42,6 +42,8 @@ def unit_of(key: str) -> str:
 def builtin_names(kind: str) -> list[str]:
     """Return the names of the built-in files of one kind: "scenarios", "labs", "robots" or "decks"."""
     folder = files("hil") / "data" / kind
+    if not folder.is_dir():
+        return []
     return sorted(item.name[:-5] for item in folder.iterdir() if item.name.endswith(".toml"))
 
 
@@ -84,7 +86,7 @@ def check_board(values: Mapping[str, float]) -> None:
 
 
 def read_tree(name_or_path: str, kind: str) -> Tree:
-    """Return a file's tables laid over those of its `base`, with the robot file filled in."""
+    """Return a file's tables laid over those of its `base`, robot and camera files filled in."""
     text, where, folder = _read_text(name_or_path, kind)
     try:
         tree = tomllib.loads(text)
@@ -92,11 +94,14 @@ def read_tree(name_or_path: str, kind: str) -> Tree:
         raise BadInput(f"{where}: not valid TOML: {error}") from None
     base = tree.pop("base", None)
     if base is not None:
-        tree = merge(read_tree(_beside(folder, str(base)), "labs"), tree)
-    if isinstance(tree.get("robot"), Mapping) and "file" in tree["robot"]:
-        own = dict(tree["robot"])
-        robot_tree = read_tree(_beside(folder, str(own.pop("file"))), "robots")
-        tree["robot"] = merge(robot_tree, own)
+        of_scenario = str(base) in builtin_names("scenarios")
+        below = read_tree(_beside(folder, str(base)), "scenarios" if of_scenario else "labs")
+        tree = merge(below, tree)
+    for part in ("robot", "camera"):
+        if isinstance(tree.get(part), Mapping) and "file" in tree[part]:
+            own = dict(tree[part])
+            below = read_tree(_beside(folder, str(own.pop("file"))), f"{part}s")
+            tree[part] = merge(below, own)
     return tree
 
 

@@ -12,12 +12,13 @@ from click.testing import CliRunner
 from hil.cli.calibrate import command as calibrate
 from hil.cli.localise import command as localise
 from hil.config.camera import CameraConfig
+from hil.config.load import load_scenario
 from hil.errors import BadInput
 from hil.types import wrap_pi
 from sim_twin.camera_sim import RenderedCamera
 from tests.calibration.render import LENS, TagFloor, board_image, hand_held
 from vision.calibration.boards import parse_board
-from vision.calibration.files import read_camera
+from vision.calibration.files import Table, read_camera, update_camera
 from vision.cv_compat import read_image, write_image
 from vision.marks import MarkLocaliser
 
@@ -126,6 +127,23 @@ def test_one_command_leaves_the_tables_of_the_others_alone(lab, tmp_path):
     assert "# by hand" not in after
     for table in ("[lens]", "[marks.front]", "[marks.rear]"):
         assert after.split(table)[1].split("[")[0:1] == before.split(table)[1].split("[")[0:1]
+
+
+@pytest.mark.usefixtures("calibrated")
+def test_a_scenario_takes_the_camera_file(lab, tmp_path):
+    """`[camera] file` lays the calibration under what the scenario says of the camera itself."""
+    copy = tmp_path / "lab.toml"
+    copy.write_text("# top\nlatency_s = 0.041\n" + lab.file.read_text())
+    update_camera(copy, [Table("", {"rate_hz": 25.0})])
+    own = tmp_path / "own.toml"
+    own.write_text('base = "scenario-1"\n[camera]\nfile = "lab.toml"\nexposure_s = 0.004\n')
+    camera = load_scenario(str(own)).camera
+    assert (camera.latency_s, camera.rate_hz, camera.exposure_s) == (0.041, 25.0, 0.004)
+    assert camera.lens == read_camera(lab.file).lens
+    assert camera.pose.R_world_cam is not None
+    assert copy.read_text().startswith("# top\n")
+    with pytest.raises(BadInput, match="no terminal"):
+        call(calibrate, "latency", "0", "--camera-file", copy)
 
 
 @pytest.mark.usefixtures("calibrated")

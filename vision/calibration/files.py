@@ -87,12 +87,20 @@ def update_camera(path: Path, tables: Sequence[Table]) -> CameraConfig:
     if path.exists():
         read_camera(path)
     for table in tables:
-        blocks[table.name] = table.text()
+        # The top keys are of several commands: those that are not written now stay.
+        kept = _without(blocks.get("", ""), table.values) if not table.name else ""
+        blocks[table.name] = kept + table.text()
     order = sorted(blocks, key=lambda name: name != "")
     text = "\n".join(blocks[name].strip("\n") + "\n" for name in order)
     config = _parse(text, path)
     write_atomic(path, text.encode("utf-8"))
     return config
+
+
+def _without(block: str, keys: Mapping[str, Value]) -> str:
+    """Return the lines of a block that do not set one of the keys."""
+    lines = block.splitlines(keepends=True)
+    return "".join(line for line in lines if line.split("=")[0].strip() not in keys)
 
 
 def _blocks(text: str) -> dict[str, str]:
