@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,7 @@ import click
 from hil.cli.options import json_option, print_json
 
 if TYPE_CHECKING:
-    from hil.report.compare import Comparison
+    from hil.experiment import Study
 
 
 @click.command("compare")
@@ -20,35 +19,49 @@ if TYPE_CHECKING:
               help="Write an HTML report that opens without a network.")  # fmt: skip
 @json_option
 def command(runs: tuple[Path, ...], report: Path | None, as_json: bool) -> None:
-    """Compare two or more run records of one scenario."""
+    """Compare two or more run records of one scenario.
+
+    Runs of two or more seeds per law, the same ones for each, are also compared as repeats: paired
+    by seed, with 95 % intervals.
+    """
+    from hil.experiment import study
     from hil.record.manifest import command_line
     from hil.record.reader import read_run
-    from hil.report.compare import compare_runs, to_json
+    from hil.report.html import write_report
 
-    comparison = compare_runs([read_run(run) for run in runs])
+    found = study([read_run(run) for run in runs])
     if report is not None:
-        from hil.report.html import write_report
-
-        write_report(report, [comparison], command=command_line())
+        repeats = [found.repeats] if found.repeats else []
+        write_report(report, [found.comparison], command=command_line(), repeats=repeats)
     if as_json:
-        print_json(to_json(comparison))
+        print_json(found.to_json())
         return
-    print_tables([comparison])
+    print_study(found)
     if report is not None:
         click.echo(f"report: {report}")
 
 
-def print_tables(comparisons: Sequence[Comparison]) -> None:
-    """Write a table per scenario, its warnings and its findings to stdout."""
+def print_study(study: Study) -> None:
+    """Write the table of a scenario, its warnings and findings, and its statistics to stdout."""
     from rich.console import Console
 
-    from hil.report.compare import findings, text_table
+    from hil.report.compare import HEADLINES, findings, text_table
+    from hil.report.repeats import text_tables
 
     console = Console(highlight=False)
-    for comparison in comparisons:
-        console.print(text_table(comparison))
-        for line in comparison.warnings:
-            console.print(f"[yellow]note:[/yellow] {line}")
+    comparison, repeats = study.comparison, study.repeats
+    console.print(text_table(comparison))
+    for line in comparison.warnings:
+        console.print(f"[yellow]note:[/yellow] {line}")
+    if repeats is None:
         for line in findings(comparison):
             console.print(f"- {line}")
-        console.print()
+    else:
+        console.print(f"Above: seed {repeats.seeds[0]} alone. All {len(repeats.seeds)} seeds:")
+        for arm, count in repeats.complete.items():
+            console.print(f"- {arm}: {count} of {len(repeats.seeds)} runs met every requirement")
+        for line in repeats.warnings:
+            console.print(f"[yellow]note:[/yellow] {line}")
+        for table in text_tables(repeats, list(HEADLINES)):
+            console.print(table)
+    console.print()

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from hil.cli.compare import print_tables
+from hil.cli.compare import print_study
 from hil.cli.options import (
+    LAWS,
     camera_option,
-    inner_option,
     json_option,
     out_option,
     print_json,
@@ -23,7 +23,8 @@ from hil.cli.progress import run_progress
 @click.command("experiment")
 @click.argument("deck", default="thesis")
 @target_option
-@inner_option
+@click.option("--inner", type=click.Choice([*LAWS.choices, "both"]), default="asg-ism",
+              show_default=True, help="Wheel law, on the board; both gives the 2 x 2 matrix.")  # fmt: skip
 @camera_option
 @click.option("--repeats", type=click.IntRange(1, 10_000), default=1, show_default=True,
               help="Runs of each scenario and law, with seeds counting up from --seed.")  # fmt: skip
@@ -45,35 +46,48 @@ def command(
     """Run every scenario of DECK with both laws and write one report.
 
     DECK is the built-in deck `thesis` (the three experiments) or a TOML file with `scenarios` and
-    `laws`. Both laws of a scenario get the same seed: the same noise, delays and losses.
+    `laws`. Both laws of a scenario get the same seeds: the same noise, delays and losses. With
+    --repeats the report gives paired differences with 95 % intervals.
+
+    The same command with the same --out takes an interrupted experiment up where it stopped.
     """
     from hil.config.deck import load_deck
     from hil.experiment import (
         Conditions,
         circle_study,
-        compare_by_scenario,
+        claim,
         deck_specs,
         run_all,
         run_name,
+        study_by_scenario,
     )
     from hil.record.manifest import command_line
     from hil.record.reader import read_run
-    from hil.report.compare import to_json
     from hil.report.html import write_report
     from hil.run import exit_status, new_folder
 
     conditions = Conditions(target, camera, inner, seed, repeats, overrides, command_line())
     folder = out or new_folder("experiment")
     specs = deck_specs(load_deck(deck), conditions, folder)
-    with run_progress({run_name(spec): spec.scenario.duration_s for spec in specs}) as update:
-        paths = run_all(specs, update)
-    records = [read_run(path) for path in paths]
+    todo = claim(folder, specs)
+    if len(todo) < len(specs):
+        click.echo(f"{len(specs) - len(todo)} of {len(specs)} runs are there already", err=True)
+    with run_progress({run_name(spec): spec.scenario.duration_s for spec in todo}) as update:
+        run_all(todo, update)
+    records = [read_run(spec.out) for spec in specs]
     report = folder / "report.html"
-    comparisons = compare_by_scenario(records)
-    write_report(report, comparisons, command=conditions.command, circle=circle_study())
+    studies = study_by_scenario(records)
+    write_report(
+        report,
+        [item.comparison for item in studies],
+        command=conditions.command,
+        circle=circle_study(),
+        repeats=[item.repeats for item in studies if item.repeats],
+    )
     if as_json:
-        print_json({"report": str(report), "comparisons": [to_json(item) for item in comparisons]})
+        print_json({"report": str(report), "comparisons": [item.to_json() for item in studies]})
     else:
-        print_tables(comparisons)
+        for item in studies:
+            print_study(item)
         click.echo(f"report: {report}")
     return max(exit_status(record) for record in records)

@@ -70,7 +70,7 @@ def compare_runs(runs: Sequence[RunRecord]) -> Comparison:
     if len(runs) < 2:
         raise BadInput(f"compare: {len(runs)} run given, at least 2 are needed")
     for run in runs[1:]:
-        _refuse_other_task(runs[0], run)
+        refuse_other_task(runs[0], run)
     entries = tuple(_entry(label, run) for label, run in zip(labels(runs), runs, strict=True))
     first = runs[0].manifest
     description = str(first.scenario.get("description", ""))
@@ -82,7 +82,8 @@ def _entry(label: str, run: RunRecord) -> Entry:
     return Entry(label, run, figures, check(figures, run.manifest.scenario))
 
 
-def _refuse_other_task(first: RunRecord, other: RunRecord) -> None:
+def refuse_other_task(first: RunRecord, other: RunRecord) -> None:
+    """Raise BadInput when two runs are not of one task."""
     for key in _TASK_KEYS:
         here, there = first.manifest.scenario.get(key), other.manifest.scenario.get(key)
         if here != there:

@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 # Stand-ins that matplotlib writes and the page replaces by a variable of its style sheet.
-_INK, _FAINT = "#010203", "#a1a2a3"
+INK, _FAINT = "#010203", "#a1a2a3"
 _RUNS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-_VARIABLES = {_INK: "var(--ink)", _FAINT: "var(--grid)"} | {
+_VARIABLES = {INK: "var(--ink)", _FAINT: "var(--grid)"} | {
     colour: f"var(--run-{number})" for number, colour in enumerate(_RUNS)
 }
 _LAW_COLOURS = {"pid": 0, "asg-ism": 1}
@@ -48,18 +48,18 @@ _STYLE: dict[Any, Any] = {
     "axes.titlesize": 9.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "axes.edgecolor": _INK,
-    "axes.labelcolor": _INK,
-    "axes.titlecolor": _INK,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.titlecolor": INK,
     "axes.linewidth": 0.7,
     "axes.grid": True,
     "grid.color": _FAINT,
     "grid.linewidth": 0.5,
-    "xtick.color": _INK,
-    "ytick.color": _INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
     "xtick.major.width": 0.7,
     "ytick.major.width": 0.7,
-    "text.color": _INK,
+    "text.color": INK,
     "lines.linewidth": 1.3,
     "legend.frameon": False,
     "legend.fontsize": 8.5,
@@ -170,11 +170,11 @@ def path_figure(runs: Sequence[Trace], name: str, limit_m: float | None) -> str:
             axes.plot(x[-1], y[-1], "o", ms=5, color=run.paint)
     first = runs[0].samples
     reference = _thin(first["ref_z1_x_m"], first["ref_z1_y_m"])
-    floor.plot(*reference, "--", color=_INK, lw=0.8)
+    floor.plot(*reference, "--", color=INK, lw=0.8)
     floor.plot(
-        *(part[-1] for part in reference), "+", ms=11, mew=1.4, color=_INK, label="target z1*"
+        *(part[-1] for part in reference), "+", ms=11, mew=1.4, color=INK, label="target z1*"
     )
-    near.plot(0.0, 0.0, "+", ms=11, mew=1.4, color=_INK)
+    near.plot(0.0, 0.0, "+", ms=11, mew=1.4, color=INK)
     _draw_start(floor, first)
     floor.set_aspect("equal", adjustable="datalim")
     _draw_limit(near, limit_m)
@@ -188,7 +188,7 @@ def _draw_limit(near: Axes, limit_m: float | None) -> None:
     if limit_m is not None:
         turn = np.linspace(0.0, 2.0 * np.pi, 90)
         radius_mm = limit_m * 1e3
-        near.plot(radius_mm * np.cos(turn), radius_mm * np.sin(turn), ":", color=_INK, lw=0.8)
+        near.plot(radius_mm * np.cos(turn), radius_mm * np.sin(turn), ":", color=INK, lw=0.8)
     near.set_aspect("equal", adjustable="box")
     near.set_xlim(-_NEAR_MM, _NEAR_MM)
     near.set_ylim(-_NEAR_MM, _NEAR_MM)
@@ -200,8 +200,8 @@ def _draw_start(axes: Axes, samples: Columns) -> None:
     x_m, y_m, theta = (samples[f"{who}_{key}"][0] for key in ("x_m", "y_m", "theta_rad"))
     step = (0.1 * np.cos(theta), 0.1 * np.sin(theta))
     axes.arrow(x_m, y_m, *step, width=0.002, head_width=0.014, head_length=0.03,
-               length_includes_head=True, color=_INK, lw=0)  # fmt: skip
-    axes.plot(x_m, y_m, "s", ms=4, color=_INK, label="start, heading")
+               length_includes_head=True, color=INK, lw=0)  # fmt: skip
+    axes.plot(x_m, y_m, "s", ms=4, color=INK, label="start, heading")
 
 
 def error_figure(runs: Sequence[Trace], name: str, limit_m: float | None) -> str:
@@ -213,7 +213,7 @@ def error_figure(runs: Sequence[Trace], name: str, limit_m: float | None) -> str
             t_s, error_mm = _thin(run.samples["t_s"], np.abs(error_m) * 1e3)
             axes.semilogy(t_s, np.maximum(error_mm, 0.01), color=run.paint, label=run.label)
         if limit_m is not None:
-            axes.axhline(limit_m * 1e3, color=_INK, lw=0.8, ls=":", label="limit")
+            axes.axhline(limit_m * 1e3, color=INK, lw=0.8, ls=":", label="limit")
         sheet.label(component, f"|δ1,{'XY'[component]}| in mm")
     top = max(axes.get_ylim()[1] for axes in sheet.axes)
     for axes in sheet.axes:
@@ -263,7 +263,7 @@ def sliding_figure(runs: Sequence[Trace], name: str) -> str | None:
         norm = np.hypot(run.samples["s_x_m_s2"], run.samples["s_y_m_s2"])
         t_s, s_norm, eps = _thin(run.samples["t_s"], norm, run.samples["eps_m_s2"])
         axes.plot(t_s, s_norm, color=run.paint, lw=1.0, label=f"‖s‖, {run.label}")
-        axes.plot(t_s, eps, color=_INK, lw=0.8, ls=":", label=f"layer ε, {run.label}")
+        axes.plot(t_s, eps, color=INK, lw=0.8, ls=":", label=f"layer ε, {run.label}")
     sheet.label(0, "‖s‖ in m/s²")
     axes.set_ylim(0.0, None)
     return sheet.svg(name)
@@ -285,7 +285,7 @@ def _circle_tracking(circle: CircleStudy) -> str:
         for number, run in enumerate(circle.runs.values()):
             t_s, z1_m, wanted_m = _thin(run.t_s, run.z1_m[:, panel], run.z1_ref_m[:, panel])
             if number == 0:
-                axes.plot(t_s, wanted_m, "--", color=_INK, lw=0.8, label="reference z1*")
+                axes.plot(t_s, wanted_m, "--", color=INK, lw=0.8, label="reference z1*")
             axes.plot(t_s, z1_m, color=_RUNS[number], lw=1.0, label=list(circle.runs)[number])
         sheet.label(panel, f"z1,{'XY'[panel]} in m")
     return sheet.svg("circle-tracking")
@@ -312,7 +312,7 @@ def _circle_sliding(circle: CircleStudy) -> str:
         norm = np.hypot(run.s[:, 0], run.s[:, 1])
         if np.isfinite(norm).all():
             axes.plot(*_thin(run.t_s, norm), color=_RUNS[number], lw=0.9, label=f"‖s‖, {label}")
-    axes.axhline(circle.layer_m_s2, color=_INK, lw=0.8, ls=":", label="layer ε")
+    axes.axhline(circle.layer_m_s2, color=INK, lw=0.8, ls=":", label="layer ε")
     axes.set_ylim(0.0, None)
     sheet.label(0, "‖s‖ in m/s²")
     return sheet.svg("circle-sliding")

@@ -19,9 +19,11 @@ from hil.record.manifest import replace_file
 from hil.report import figures as draw
 from hil.report.assumptions import Assumption, assumptions
 from hil.report.compare import HEADLINES, Comparison, Entry, better_of, findings
+from hil.report.repeats_html import repeats_context
 
 if TYPE_CHECKING:
     from hil.report.circle import CircleStudy
+    from hil.report.repeats import Repeats
 
 # Where the thesis shows the same of its experiments: path, error, control, photographs.
 _THESIS = {
@@ -42,13 +44,16 @@ def write_report(
     command: str,
     title: str = "",
     circle: CircleStudy | None = None,
+    repeats: Sequence[Repeats] = (),
 ) -> None:
     """Write the report of one or several comparisons to `path`, atomically.
 
     `command` is the command line that made it; `circle` adds the section on ideal sensing.
     Raises BadInput when `path` cannot be written.
     """
-    page = render(comparisons, command=command, title=title, circle=circle).encode()
+    page = render(
+        comparisons, command=command, title=title, circle=circle, repeats=repeats
+    ).encode()
     try:
         replace_file(path, page)
     except OSError as error:
@@ -61,6 +66,7 @@ def render(
     command: str,
     title: str = "",
     circle: CircleStudy | None = None,
+    repeats: Sequence[Repeats] = (),
 ) -> str:
     """Return the report as HTML text."""
     template = (files("hil.report") / "report.html.j2").read_text(encoding="utf-8")
@@ -74,6 +80,7 @@ def render(
         "basis_note": _basis_note(comparisons),
         "summary": _summary(comparisons),
         "parts": [_part(comparison) for comparison in comparisons],
+        "repeats": {item.scenario_name: repeats_context(item) for item in repeats},
         "circle": _circle(circle) if circle is not None else None,
         "metrics": METRICS,
         "conditions": _conditions(comparisons),

@@ -1,0 +1,242 @@
+"""Repeated runs of one scenario: arms (outer law over inner law), paired by seed.
+
+Seeds that every arm has form the pairs. With both outer and both inner laws the four arms give
+three contrasts per figure: outer law, inner law, and their interaction.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hil.metrics import BY_NAME, METRICS, Metric
+from hil.stats import Adjusted, Paired, adjusted, paired
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from hil.record.reader import RunRecord
+
+Arm = tuple[str, str]  # outer law, inner law
+Values = dict[Arm, dict[int, float]]  # a figure of each arm by seed
+
+# The first of these that an experiment has is the baseline.
+_BASELINE_ORDER = ("pid", "asg-ism")
+
+
+@dataclass(frozen=True, slots=True)
+class Contrast:
+    """One question of an experiment and its answer per figure, by the figure's name."""
+
+    name: str
+    results: dict[str, Paired]
+    at_equal_battery: dict[str, Adjusted]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the contrast for a JSON document."""
+        figures = {name: result.to_json() for name, result in self.results.items()}
+        for name, item in self.at_equal_battery.items():
+            figures[name]["at_equal_battery"] = item.to_json()
+        return {"contrast": self.name, "figures": figures}
+
+
+@dataclass(frozen=True, slots=True)
+class Repeats:
+    """All repeats of one scenario; `complete` counts the runs of each arm that met everything."""
+
+    scenario_name: str
+    seeds: tuple[int, ...]
+    arms: dict[str, int]
+    complete: dict[str, int]
+    contrasts: tuple[Contrast, ...]
+    warnings: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the statistics for a JSON document."""
+        return {
+            "scenario": self.scenario_name,
+            "seeds": list(self.seeds),
+            "arms": self.arms,
+            "met_every_requirement": self.complete,
+            "warnings": list(self.warnings),
+            "contrasts": [contrast.to_json() for contrast in self.contrasts],
+        }
+
+
+def arm_of(run: RunRecord) -> Arm:
+    """Return the arm a run belongs to."""
+    return run.manifest.outer, run.manifest.inner
+
+
+def repeats_of(runs: Sequence[RunRecord]) -> Repeats | None:
+    """Return the statistics of runs of one scenario; None without two arms and two common seeds."""
+    arms: dict[Arm, dict[int, RunRecord]] = {}
+    for run in runs:
+        arms.setdefault(arm_of(run), {})[run.manifest.seed] = run
+    arms = dict(sorted(arms.items(), key=lambda item: [_rank(law) for law in item[0]]))
+    common = sorted(set.intersection(*(set(by_seed) for by_seed in arms.values())))
+    if len(arms) < 2 or len(common) < 2:
+        return None
+    names = _arm_names(list(arms))
+    paired_runs = {arm: {seed: by_seed[seed] for seed in common} for arm, by_seed in arms.items()}
+    figures = {
+        arm: {seed: run.figures().values for seed, run in by_seed.items()}
+        for arm, by_seed in paired_runs.items()
+    }
+    by_figure: dict[str, Values] = {
+        metric.name: {
+            arm: {seed: values[metric.name] for seed, values in by_seed.items()}
+            for arm, by_seed in figures.items()
+        }
+        for metric in METRICS
+        if metric.better != "neither"
+    }
+    battery: Values = {
+        arm: {seed: _battery_v(run) for seed, run in by_seed.items()}
+        for arm, by_seed in paired_runs.items()
+    }
+    return Repeats(
+        scenario_name=runs[0].manifest.scenario_name,
+        seeds=tuple(common),
+        arms={names[arm]: len(by_seed) for arm, by_seed in arms.items()},
+        complete={
+            names[arm]: sum(_holds(run) for run in by_seed.values())
+            for arm, by_seed in paired_runs.items()
+        },
+        contrasts=tuple(
+            _contrast(name, sides, by_figure, battery, common)
+            for name, sides in _questions(list(arms), names)
+        ),
+        warnings=tuple(_warnings(arms, names, common)),
+    )
+
+
+def _rank(law: str) -> tuple[int, str]:
+    known = _BASELINE_ORDER.index(law) if law in _BASELINE_ORDER else len(_BASELINE_ORDER)
+    return known, law
+
+
+def _arm_names(arms: Sequence[Arm]) -> dict[Arm, str]:
+    """Return what tells the arms apart: the law that varies, or both."""
+    for index in (0, 1):
+        if len({arm[1 - index] for arm in arms}) == 1:
+            return {arm: arm[index] for arm in arms}
+    return {(outer, inner): f"{outer} over {inner}" for outer, inner in arms}
+
+
+# How a question combines the arms of one seed: weights of the arms on each side.
+Sides = tuple[dict[Arm, float], dict[Arm, float]]
+
+
+def _questions(arms: Sequence[Arm], names: dict[Arm, str]) -> list[tuple[str, Sides]]:
+    """Return the contrasts: every arm against the first, and the factors of a full 2 x 2."""
+    base = arms[0]
+    found: list[tuple[str, Sides]] = [
+        (f"{names[arm]} - {names[base]}", ({base: 1.0}, {arm: 1.0})) for arm in arms[1:]
+    ]
+    outers = list(dict.fromkeys(arm[0] for arm in arms))
+    inners = list(dict.fromkeys(arm[1] for arm in arms))
+    if len(outers) == 2 and len(inners) == 2 and len(arms) == 4:
+        (a, b), (c, d) = outers, inners
+        found += [
+            (f"outer law: {b} - {a}, mean over the inner laws",
+             ({(a, c): 0.5, (a, d): 0.5}, {(b, c): 0.5, (b, d): 0.5})),
+            (f"inner law: {d} - {c}, mean over the outer laws",
+             ({(a, c): 0.5, (b, c): 0.5}, {(a, d): 0.5, (b, d): 0.5})),
+            ("interaction: outer difference over the second inner law - over the first",
+             ({(b, c): 1.0, (a, d): 1.0}, {(a, c): 1.0, (b, d): 1.0})),
+        ]  # fmt: skip
+    return found
+
+
+def _contrast(
+    name: str, sides: Sides, by_figure: dict[str, Values], battery: Values, seeds: Sequence[int]
+) -> Contrast:
+    def arm_values(values: Values, weights: dict[Arm, float]) -> list[float]:
+        return [sum(w * values[arm][seed] for arm, w in weights.items()) for seed in seeds]
+
+    def difference(values: Values) -> list[float]:
+        one, two = (arm_values(values, weights) for weights in sides)
+        return [b - a for a, b in zip(one, two, strict=True)]
+
+    volts = difference(battery)
+    results, at_equal = {}, {}
+    for figure, values in by_figure.items():
+        results[figure] = paired(*(arm_values(values, weights) for weights in sides))
+        item = adjusted(difference(values), volts)
+        if item is not None:
+            at_equal[figure] = item
+    return Contrast(name, results, at_equal)
+
+
+def _battery_v(run: RunRecord) -> float:
+    """Return the battery's mean voltage before the wheels load it: over the first second."""
+    samples = run.samples
+    early = samples["battery_v"][samples["t_s"] <= 1.0]
+    known = early[np.isfinite(early)]
+    # A real cell falls by hundredths of a volt from run to run; less is the converter's noise.
+    return round(float(known.mean()), 2) if known.size else math.nan
+
+
+def _holds(run: RunRecord) -> bool:
+    complete = run.manifest.outcome == "complete"
+    return complete and all(verdict.holds for verdict in run.verdicts())
+
+
+def _warnings(
+    arms: dict[Arm, dict[int, RunRecord]], names: dict[Arm, str], common: Sequence[int]
+) -> list[str]:
+    lines = []
+    for arm, by_seed in arms.items():
+        alone = sorted(set(by_seed) - set(common))
+        if alone:
+            lines.append(f"{names[arm]}: {len(alone)} runs without a partner of the same seed")
+        ended = sum(run.manifest.outcome != "complete" for run in by_seed.values())
+        if ended:
+            lines.append(f"{names[arm]}: {ended} runs ended early; their figures cover a part")
+    if len(common) < 10:
+        lines.append(f"{len(common)} pairs: an interval from so few is rough")
+    return lines
+
+
+def verdict(metric: Metric, result: Paired, name: str) -> str:
+    """Return one sentence on one figure of a contrast."""
+    if result.pairs < 2:
+        return f"{metric.label}: {result.pairs} pairs, nothing can be said"
+    low, high = (metric.text(value) for value in (result.interval.low, result.interval.high))
+    said = f"{metric.label}: {name} = {metric.text(result.mean)}, 95 % {low} to {high}"
+    left = f", {result.left_out} pairs without a value" if result.left_out else ""
+    if not result.certain:
+        return f"{said}{left}: no difference shown"
+    better = (result.mean < 0) == (metric.better == "lower")
+    return f"{said}{left}: {'better' if better else 'worse'}"
+
+
+def text_tables(repeats: Repeats, figures: Sequence[str]) -> list[Table]:
+    """Return one table per contrast for a terminal, over the named figures."""
+    return [_table(repeats, contrast, figures) for contrast in repeats.contrasts]
+
+
+def _table(repeats: Repeats, contrast: Contrast, figures: Sequence[str]) -> Table:
+    from rich.table import Table  # noqa: PLC0415 - terminals only
+
+    title = f"{repeats.scenario_name}: {contrast.name}, {len(repeats.seeds)} pairs"
+    table = Table(title=title, title_justify="left")
+    for head in ("figure", "baseline", "other", "difference", "95 % interval", "effect", "unit"):
+        table.add_column(head, justify="left" if head in {"figure", "unit"} else "right")
+    for name in figures:
+        metric, result = BY_NAME[name], contrast.results[name]
+        shown = (result.baseline_mean, result.other_mean, result.mean)
+        cells = [metric.text(value, with_unit=False) for value in shown]
+        ends = (result.interval.low, result.interval.high)
+        span = " to ".join(metric.text(value, with_unit=False) for value in ends)
+        if result.certain:
+            good = (result.mean < 0) == (metric.better == "lower")
+            cells[2] = f"[bold {'green' if good else 'red'}]{cells[2]}[/]"
+        effect = f"{result.effect:.2f}" if math.isfinite(result.effect) else "–"
+        table.add_row(metric.label, *cells, span, effect, metric.shown_unit)
+    return table
