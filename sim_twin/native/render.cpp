@@ -10,13 +10,14 @@
 namespace camera {
 namespace {
 
-constexpr int SETS = 64, PER_SET = 24, SAMPLES_PLAIN = 8, SAMPLES_BACKGROUND = 8;
+constexpr int SETS = 64, PER_SET = 24, SAMPLES_BACKGROUND = 8;
+// An edge is sampled as its contrast deserves: of a mark, of others, between two shades of black.
+constexpr int SAMPLES_MARK = PER_SET, SAMPLES_PLAIN = 8, SAMPLES_FAINT = 4;
 constexpr int SLOTS = 8;
 constexpr int BANK = 1 << 18;
 constexpr float NORMAL_STEPS = 6000.0f;  // of one standard deviation; 5.4 of them fit
 constexpr float DN_STEPS = 64.0f;
-constexpr float DN_MAX = 320.0f, SIGMA_MAX_DN = 30.0f;  // so that level plus noise fits 16 bits
-constexpr uint8_t EDGE = 1, EDGE_SIDES = 2, EDGE_MARK = 4;
+constexpr float DN_MAX = 319.0f, SIGMA_MAX_DN = 30.0f;  // so that level plus noise fits 16 bits
 
 // Counter-based: the value depends on the arguments alone (splitmix64).
 uint64_t hash(uint64_t a, uint64_t b, uint64_t c) {
@@ -74,9 +75,31 @@ Renderer::Renderer(const View& view, const Scene& scene, const Robot& robot, uin
                                   std::hypot(bar.x1, bar.y1) + bar.half_width});
         robot_height_ = std::max(robot_height_, bar.z);
     }
+    edge_table();
     sample_table();
     noise_bank();
     background();
+}
+
+// What an edge between any two ids is.
+void Renderer::edge_table() {
+    constexpr float FAINT = 0.15f;  // reflectance, the three colours together: 10 DN each
+    const auto in_plane = [this](size_t id) {
+        return id >= ID_PLATE && id < ID_PATCH + robot_.patches.size();
+    };
+    const size_t count = colour_of_id_.size();
+    edge_of_ids_.assign(count * count, 0);
+    for (size_t a = 0; a < count; ++a)
+        for (size_t b = 0; b < count; ++b) {
+            if (a == b) continue;
+            float contrast = 0.0f;
+            for (int k = 0; k < 3; ++k)
+                contrast += std::fabs(colour_of_id_[a][k] - colour_of_id_[b][k]);
+            edge_of_ids_[a * count + b] = static_cast<uint8_t>(
+                EDGE | (in_plane(a) && in_plane(b) ? 0 : EDGE_SIDES) |
+                (mark_id_[a] || mark_id_[b] ? EDGE_MARK : 0) |
+                (a == ID_FLOOR || b == ID_FLOOR || contrast > FAINT ? EDGE_PLAIN : 0));
+        }
 }
 
 void Renderer::sample_table() {
@@ -105,58 +128,52 @@ void Renderer::noise_bank() {
         const double x = radius * std::cos(2.0 * M_PI * unit(hash(seed_, i, 2)));
         normal_[i] = static_cast<int16_t>(std::clamp(x * NORMAL_STEPS, -32767.0, 32767.0));
     }
-    const float read2 = scene_.read_noise * scene_.read_noise;
-    for (int dn = 0; dn <= static_cast<int>(DN_MAX); ++dn) {
-        const float sigma = std::sqrt(read2 + scene_.dn_per_electron * static_cast<float>(dn));
-        sigma_of_dn_.push_back(static_cast<int16_t>(
-            std::min(sigma, SIGMA_MAX_DN) * (DN_STEPS * 65536.0f / NORMAL_STEPS)));
-    }
 }
 
-Sight Renderer::sight_at(int u, int v, float du, float dv) const {
-    const int width = view_.width;
-    const size_t at = static_cast<size_t>(v) * width + u;
-    const Sight& s = sight_[at];
-    // Linear within the pixel: the lean curves by 1e-6 per px^2, 2 um on the floor.
-    const Sight& right = u + 1 < width ? sight_[at + 1] : sight_[at - 1];
-    const Sight& down = v + 1 < view_.height ? sight_[at + width] : sight_[at - width];
-    const float a = u + 1 < width ? du : -du, b = v + 1 < view_.height ? dv : -dv;
-    return {s.x + (right.x - s.x) * a + (down.x - s.x) * b,
-            s.y + (right.y - s.y) * a + (down.y - s.y) * b,
-            s.lx + (right.lx - s.lx) * a + (down.lx - s.lx) * b,
-            s.ly + (right.ly - s.ly) * a + (down.ly - s.ly) * b};
+SightPatch Renderer::sight_patch(int u, int v) const {
+    const auto at = [&](int i, int j) -> const Sight& {
+        return sight_[static_cast<size_t>(j) * view_.width + i];
+    };
+    const auto slope = [](const Sight& a, const Sight& b) {
+        return Sight{b.x - a.x, b.y - a.y, b.lx - a.lx, b.ly - a.ly};
+    };
+    const int i = std::min(u, view_.width - 2), j = std::min(v, view_.height - 2);
+    return {at(u, v), slope(at(i, v), at(i + 1, v)), slope(at(u, j), at(u, j + 1))};
 }
 
 void Renderer::background() {
     const size_t pixels = sight_.size();
-    static_dn_.resize(3 * pixels);
+    for (std::vector<float>* map : {&floor_dn_, &glare_dn_, &dn_}) map->resize(3 * pixels);
     for (int v = 0; v < view_.height; ++v)
         for (int u = 0; u < view_.width; ++u) {
             const size_t at = static_cast<size_t>(v) * view_.width + u;
             const Sample* samples = &samples_[hash(1, u, v) % SETS * PER_SET];
+            const SightPatch patch = sight_patch(u, v);
             float sum[3] = {0, 0, 0};
             for (int i = 0; i < SAMPLES_BACKGROUND; ++i) {
-                const Colour c = floor_sample(sight_at(u, v, samples[i].du, samples[i].dv));
+                const Colour c = floor_sample(patch.at(samples[i].du, samples[i].dv));
                 for (int k = 0; k < 3; ++k) sum[k] += c[k];
             }
-            for (int k = 0; k < 3; ++k)
-                static_dn_[3 * at + k] =
-                    scene_.white_balance[k] *
-                    (sum[k] / SAMPLES_BACKGROUND * scene_.light[at] + scene_.glare[at]);
+            for (int k = 0; k < 3; ++k) {
+                const float gain = scene_.white_balance[k];
+                floor_dn_[3 * at + k] = gain * sum[k] / SAMPLES_BACKGROUND * scene_.light[at];
+                glare_dn_[3 * at + k] = gain * scene_.glare[at];
+                dn_[3 * at + k] = floor_dn_[3 * at + k] + glare_dn_[3 * at + k];
+            }
         }
     level_.resize(3 * pixels);
     sigma_.resize(3 * pixels);
-    quantise(static_dn_.data(), static_cast<int>(3 * pixels), level_.data(), sigma_.data());
+    quantise(dn_.data(), static_cast<int>(3 * pixels), level_.data(), sigma_.data());
 }
 
-Renderer::Window Renderer::window() const {
+// The part of the image that the robot at its first and last pose can reach, grown by `reach_m` on
+// the floor.
+Renderer::Window Renderer::window(double reach_m) const {
     double lo_u = 1e9, lo_v = 1e9, hi_u = -1e9, hi_v = -1e9;
-    const double lamp = std::max(std::fabs(scene_.lamp_x), std::fabs(scene_.lamp_y));
     for (const Pose& pose : {slots_.front(), slots_.back()})
         for (int level = 0; level < 2; ++level)
             for (int i = 0; i < 16; ++i) {
-                const double reach =
-                    1.02 * robot_radius_ + (level ? 0.0 : SHADE_REACH_M + lamp * robot_.top);
+                const double reach = 1.02 * robot_radius_ + (level ? 0.0 : reach_m);
                 const double angle = M_PI / 8.0 * i;
                 double u, v;
                 if (!project(view_, pose.x + reach * std::cos(angle),
@@ -174,115 +191,76 @@ Renderer::Window Renderer::window() const {
             bound(hi_u + reach_ + 2, view_.width), bound(hi_v + reach_ + 2, view_.height)};
 }
 
-void Renderer::classify(const Window& w) {
-    const int columns = w.u1 - w.u0, rows = w.v1 - w.v0;
-    const size_t count = static_cast<size_t>(columns) * rows;
-    id_first_.resize(count);
-    id_last_.resize(count);
-    flags_.assign(count, 0);
-    const Pose &first = slots_.front(), &last = slots_.back();
-    const bool still = std::fabs(first.x - last.x) + std::fabs(first.y - last.y) +
-                           robot_radius_ * std::fabs(first.s - last.s) <
-                       1e-4f;
-    for (int j = 0; j < rows; ++j)
-        for (int i = 0; i < columns; ++i) {
-            const Sight& s = sight_[static_cast<size_t>(w.v0 + j) * view_.width + w.u0 + i];
-            const size_t at = static_cast<size_t>(j) * columns + i;
-            id_first_[at] = trace(s, first);
-            id_last_[at] = still ? id_first_[at] : trace(s, last);
-        }
-    const auto in_plane = [this](uint8_t id) {
-        return id >= ID_PLATE && id < ID_PATCH + robot_.patches.size();
-    };
-    const auto mark_edge = [&](size_t a, uint8_t id_a, size_t b, uint8_t id_b) {
-        if (id_a == id_b) return;
-        const uint8_t flag = EDGE | (in_plane(id_a) && in_plane(id_b) ? 0 : EDGE_SIDES) |
-                             (mark_id_[id_a] || mark_id_[id_b] ? EDGE_MARK : 0);
-        flags_[a] |= flag;
-        flags_[b] |= flag;
-    };
-    for (int j = 0; j < rows; ++j)
-        for (int i = 0; i < columns; ++i) {
-            const size_t at = static_cast<size_t>(j) * columns + i;
-            mark_edge(at, id_first_[at], at, id_last_[at]);
-            if (i + 1 < columns) {
-                mark_edge(at, id_first_[at], at + 1, id_first_[at + 1]);
-                mark_edge(at, id_last_[at], at + 1, id_last_[at + 1]);
-            }
-            if (j + 1 < rows) {
-                mark_edge(at, id_first_[at], at + columns, id_first_[at + columns]);
-                mark_edge(at, id_last_[at], at + columns, id_last_[at + columns]);
-            }
-        }
-    // The blur carries an edge `reach_` px; spread the flags along rows, then columns.
-    flags_row_.assign(count, 0);
-    for (int j = 0; j < rows; ++j)
-        for (int d = -reach_ + 1; d < reach_; ++d)
-            for (int i = std::max(0, -d); i < std::min(columns, columns - d); ++i)
-                flags_row_[static_cast<size_t>(j) * columns + i] |=
-                    flags_[static_cast<size_t>(j) * columns + i + d];
-    flags_.assign(count, 0);
-    for (int j = 0; j < rows; ++j)
-        for (int d = std::max(-reach_ + 1, -j); d < std::min(reach_, rows - j); ++d)
-            for (int i = 0; i < columns; ++i)
-                flags_[static_cast<size_t>(j) * columns + i] |=
-                    flags_row_[static_cast<size_t>(j + d) * columns + i];
+// Finds what the robot hides and shades. Bars over the floor take no shade, so where there are any
+// the whole shaded part is looked at pixel by pixel.
+void Renderer::set_windows() {
+    const double lamp = std::max(std::fabs(scene_.lamp_x), std::fabs(scene_.lamp_y));
+    shaded_ = window(SHADE_REACH_M + lamp * robot_.top);
+    const bool bars = std::any_of(scene_.bars.begin(), scene_.bars.end(),
+                                  [](const Bar& bar) { return !bar.body; });
+    const Window body = bars ? shaded_ : window(0.0);
+    hidden_ = {std::max(body.u0, shaded_.u0), std::max(body.v0, shaded_.v0),
+               std::min(body.u1, shaded_.u1), std::min(body.v1, shaded_.v1)};
 }
 
-void Renderer::composite_pixel(int u, int v, uint8_t flags, uint8_t id, float* dn) const {
+void Renderer::composite_pixel(int u, int v, uint8_t flags, uint8_t id, float shade,
+                               float* dn) const {
     const size_t at = static_cast<size_t>(v) * view_.width + u;
     float sum[3] = {0, 0, 0};
     int floor = 0, count = 1;
-    if (!(flags & EDGE)) {
-        floor = id == ID_FLOOR;
-        for (int k = 0; k < 3; ++k) sum[k] = colour_of_id_[id][k];
-    } else {
-        const Sample* samples = &samples_[hash(2, u, v) % SETS * PER_SET];
-        count = flags & EDGE_MARK ? PER_SET : SAMPLES_PLAIN;
+    if (flags & EDGE) {
+        count = flags & EDGE_MARK ? SAMPLES_MARK : flags & EDGE_PLAIN ? SAMPLES_PLAIN : SAMPLES_FAINT;
+        uint8_t hits[PER_SET];
+        trace_samples(u, v, &samples_[hash(2, u, v) % SETS * PER_SET], count, flags, hits);
         for (int i = 0; i < count; ++i) {
-            const Sight s = sight_at(u, v, samples[i].du, samples[i].dv);
-            const Pose& p = slots_[samples[i].slot];
-            uint8_t hit;
-            if (flags & EDGE_SIDES) {
-                hit = trace(s, p);
-            } else {
-                const float x = s.x + s.lx * robot_.top - p.x, y = s.y + s.ly * robot_.top - p.y;
-                hit = trace_top(p.c * x + p.s * y, p.c * y - p.s * x);
-            }
-            floor += hit == ID_FLOOR;
-            for (int k = 0; k < 3; ++k) sum[k] += colour_of_id_[hit][k];
+            floor += hits[i] == ID_FLOOR;
+            for (int k = 0; k < 3; ++k) sum[k] += colour_of_id_[hits[i]][k];
         }
+    } else {
+        for (int k = 0; k < 3; ++k) sum[k] = colour_of_id_[id][k];
     }
     const float share = 1.0f / static_cast<float>(count);
-    const float floor_share = static_cast<float>(floor) * share;
-    const float shade = floor > 0 ? shade_at(u, v) : 1.0f;
-    for (int k = 0; k < 3; ++k) {
-        const float glare = scene_.white_balance[k] * scene_.glare[at];
-        const float floor_dn = static_dn_[3 * at + k] - glare;
-        dn[k] = glare + floor_share * shade * floor_dn +
+    const float floor_share = static_cast<float>(floor) * share * shade;
+    for (int k = 0; k < 3; ++k)
+        dn[k] = glare_dn_[3 * at + k] + floor_share * floor_dn_[3 * at + k] +
                 share * sum[k] * scene_.light[at] * scene_.white_balance[k];
-    }
 }
 
-void Renderer::composite(const Window& w) {
-    const int columns = w.u1 - w.u0, rows = w.v1 - w.v0;
+void Renderer::composite() {
+    const Window &w = shaded_, &body = hidden_;
+    const int columns = w.u1 - w.u0, rows = w.v1 - w.v0, across = body.u1 - body.u0;
     const size_t count = 3 * static_cast<size_t>(columns) * rows;
     dn_.resize(count);
     window_level_.resize(count);
     window_sigma_.resize(count);
-    for (int j = 0; j < rows; ++j)
-        for (int i = 0; i < columns; ++i) {
-            const size_t at = static_cast<size_t>(j) * columns + i;
-            composite_pixel(w.u0 + i, w.v0 + j, flags_[at], id_first_[at], &dn_[3 * at]);
+    shade_.resize(columns);
+    for (int v = w.v0; v < w.v1; ++v) {
+        const size_t first = static_cast<size_t>(v) * view_.width + w.u0;
+        float* dn = &dn_[3 * static_cast<size_t>(v - w.v0) * columns];
+        const float *floor = &floor_dn_[3 * first], *glare = &glare_dn_[3 * first];
+        shade_row(&sight_[first], columns, shade_.data());
+        for (int i = 0; i < columns; ++i)
+            for (int k = 0; k < 3; ++k)
+                dn[3 * i + k] = glare[3 * i + k] + shade_[i] * floor[3 * i + k];
+        if (v < body.v0 || v >= body.v1) continue;
+        const size_t row = static_cast<size_t>(v - body.v0) * across;
+        for (int i = 0; i < across; ++i) {
+            const uint8_t flags = flags_[row + i], id = id_first_[row + i];
+            const int u = body.u0 + i, column = u - w.u0;
+            if (flags || id != ID_FLOOR)
+                composite_pixel(u, v, flags, id, shade_[column], dn + 3 * column);
         }
+    }
     quantise(dn_.data(), static_cast<int>(count), window_level_.data(), window_sigma_.data());
 }
 
 void Renderer::quantise(const float* dn, int count, int16_t* level, int16_t* sigma) const {
+    const float read2 = scene_.read_noise * scene_.read_noise, shot = scene_.dn_per_electron;
     for (int i = 0; i < count; ++i) {
-        const float value = std::clamp(dn[i], 0.0f, DN_MAX - 1.0f);
+        const float value = std::min(std::max(dn[i], 0.0f), DN_MAX);
         level[i] = static_cast<int16_t>(value * DN_STEPS + 0.5f);
-        sigma[i] = sigma_of_dn_[static_cast<int>(value + 0.5f)];
+        sigma[i] = static_cast<int16_t>(std::min(std::sqrt(read2 + shot * value), SIGMA_MAX_DN) *
+                                        (DN_STEPS * 65536.0f / NORMAL_STEPS));
     }
 }
 
@@ -330,13 +308,11 @@ void Renderer::make(uint64_t index, const std::vector<std::array<double, 3>>& po
         const std::vector<Pose> drawn = slots_of(poses);
         if (!same(drawn, slots_)) {
             slots_ = drawn;
-            drawn_window_ = window();
-            if (drawn_window_.u1 > drawn_window_.u0 && drawn_window_.v1 > drawn_window_.v0) {
-                classify(drawn_window_);
-                composite(drawn_window_);
-            }
+            set_windows();
+            classify();
+            composite();
         }
-        w = drawn_window_;
+        w = shaded_;
     }
     const int width = view_.width;
     for (int v = 0; v < view_.height; ++v) {

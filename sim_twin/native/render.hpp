@@ -82,6 +82,16 @@ struct Sight {
     float x = 0, y = 0, lx = 0, ly = 0;
 };
 
+// Lines of sight within one pixel: linear, as the lean curves by 1e-6 per px^2, 2 um on the floor.
+struct SightPatch {
+    Sight middle, per_u, per_v;
+    Sight at(float du, float dv) const {
+        return {middle.x + per_u.x * du + per_v.x * dv, middle.y + per_u.y * du + per_v.y * dv,
+                middle.lx + per_u.lx * du + per_v.lx * dv,
+                middle.ly + per_u.ly * du + per_v.ly * dv};
+    }
+};
+
 // Where in its pixel and when in the exposure one sample is taken.
 struct Sample {
     float du = 0, dv = 0;
@@ -101,20 +111,24 @@ private:
         int u0, v0, u1, v1;
     };
     void background();
+    void edge_table();
     void noise_bank();
     void sample_table();
     Colour floor_sample(const Sight& sight) const;
-    Sight sight_at(int u, int v, float du, float dv) const;
+    SightPatch sight_patch(int u, int v) const;
     static std::vector<Pose> slots_of(const std::vector<std::array<double, 3>>& poses);
     static bool same(const std::vector<Pose>& a, const std::vector<Pose>& b);
-    Window window() const;
-    void classify(const Window& w);
-    void composite(const Window& w);
-    void composite_pixel(int u, int v, uint8_t flags, uint8_t id, float* dn) const;
+    Window window(double reach_m) const;
+    void set_windows();
+    void classify();
+    void composite();
+    void composite_pixel(int u, int v, uint8_t flags, uint8_t id, float shade, float* dn) const;
+    void trace_samples(int u, int v, const Sample* samples, int count, uint8_t flags,
+                       uint8_t* hits) const;
     uint8_t trace(const Sight& world, const Pose& pose) const;
     uint8_t trace_top(float x, float y) const;
     uint8_t trace_sides(const Sight& body) const;
-    float shade_at(int u, int v) const;
+    void shade_row(const Sight* floor, int count, float* shade) const;
     void quantise(const float* dn, int count, int16_t* level, int16_t* sigma) const;
     void emit(const int16_t* level, const int16_t* sigma, const int16_t* normal, int count,
               uint8_t* out) const;
@@ -124,19 +138,18 @@ private:
     Robot robot_;
     uint64_t seed_;
     std::vector<Sight> sight_;  // per pixel centre
-    std::vector<float> static_dn_;  // background before noise
+    std::vector<float> floor_dn_, glare_dn_;  // background before noise: what shade takes, the rest
     std::vector<int16_t> level_, sigma_;  // the same in the noise stage's steps
-    std::vector<int16_t> sigma_of_dn_;
     std::vector<int16_t> normal_;
     std::vector<Sample> samples_;
     std::vector<Colour> colour_of_id_;
-    std::vector<bool> mark_id_;
+    std::vector<uint8_t> mark_id_, edge_of_ids_;
     int reach_ = 1;  // px that the lens blur carries an edge
     float robot_radius_ = 0, robot_height_ = 0;
     std::vector<Pose> slots_;  // as last composited into the window buffers
-    Window drawn_window_{0, 0, 0, 0};
+    Window shaded_{0, 0, 0, 0}, hidden_{0, 0, 0, 0};  // what the robot shades; what it may hide
     std::vector<uint8_t> id_first_, id_last_, flags_, flags_row_;
-    std::vector<float> dn_;
+    std::vector<float> dn_, shade_;
     std::vector<int16_t> window_level_, window_sigma_;
 };
 

@@ -16,6 +16,10 @@ enum Id : uint8_t {
     ID_PATCH,
 };
 
+// What lies near a pixel: an edge, one not in the plate's plane alone, one of a mark, one of more
+// than faint contrast.
+constexpr uint8_t EDGE = 1, EDGE_SIDES = 2, EDGE_MARK = 4, EDGE_PLAIN = 8;
+
 constexpr float SHADE_REACH_M = 0.06f;  // penumbra of the robot on the floor: a lamp 1 m wide
 
 }  // namespace camera

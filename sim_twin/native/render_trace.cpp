@@ -109,6 +109,10 @@ uint8_t Renderer::trace_sides(const Sight& body) const {
         const float xw = wheel & 1 ? robot_.half_base : -robot_.half_base;
         const float yw = wheel & 2 ? robot_.half_track : -robot_.half_track;
         const Sight local{body.x - xw, body.y - yw, body.lx, body.ly};
+        const float r = robot_.wheel_radius;
+        if (std::fabs(local.y + local.ly * r) > robot_.wheel_half_width + std::fabs(local.ly) * r ||
+            std::fabs(local.x + local.lx * r) > r + std::fabs(local.lx) * r)
+            continue;
         bool on_hub;
         if (meets_wheel(local, robot_.wheel_radius, robot_.wheel_half_width, z, on_hub) &&
             z > best) {
@@ -135,16 +139,87 @@ uint8_t Renderer::trace(const Sight& world, const Pose& pose) const {
     return trace_sides(body);
 }
 
-float Renderer::shade_at(int u, int v) const {
-    const Sight& floor = sight_[static_cast<size_t>(v) * view_.width + u];
+void Renderer::classify() {
+    const Window& w = hidden_;
+    const int columns = std::max(w.u1 - w.u0, 0), rows = std::max(w.v1 - w.v0, 0);
+    const size_t count = static_cast<size_t>(columns) * rows;
+    id_first_.resize(count);
+    id_last_.resize(count);
+    flags_.assign(count, 0);
+    const Pose &first = slots_.front(), &last = slots_.back();
+    const bool still = std::fabs(first.x - last.x) + std::fabs(first.y - last.y) +
+                           robot_radius_ * std::fabs(first.s - last.s) <
+                       1e-4f;
+    for (int j = 0; j < rows; ++j)
+        for (int i = 0; i < columns; ++i) {
+            const Sight& s = sight_[static_cast<size_t>(w.v0 + j) * view_.width + w.u0 + i];
+            const size_t at = static_cast<size_t>(j) * columns + i;
+            id_first_[at] = trace(s, first);
+            id_last_[at] = still ? id_first_[at] : trace(s, last);
+        }
+    const size_t ids = colour_of_id_.size();
+    const auto mark_edge = [&](size_t a, uint8_t id_a, size_t b, uint8_t id_b) {
+        if (id_a == id_b) return;
+        const uint8_t flag = edge_of_ids_[id_a * ids + id_b];
+        flags_[a] |= flag;
+        flags_[b] |= flag;
+    };
+    for (int j = 0; j < rows; ++j)
+        for (int i = 0; i < columns; ++i) {
+            const size_t at = static_cast<size_t>(j) * columns + i;
+            mark_edge(at, id_first_[at], at, id_last_[at]);
+            if (i + 1 < columns) {
+                mark_edge(at, id_first_[at], at + 1, id_first_[at + 1]);
+                mark_edge(at, id_last_[at], at + 1, id_last_[at + 1]);
+            }
+            if (j + 1 < rows) {
+                mark_edge(at, id_first_[at], at + columns, id_first_[at + columns]);
+                mark_edge(at, id_last_[at], at + columns, id_last_[at + columns]);
+            }
+        }
+    // The blur carries an edge `reach_` px; spread the flags along rows, then columns.
+    flags_row_.assign(count, 0);
+    for (int j = 0; j < rows; ++j)
+        for (int d = -reach_ + 1; d < reach_; ++d)
+            for (int i = std::max(0, -d); i < std::min(columns, columns - d); ++i)
+                flags_row_[static_cast<size_t>(j) * columns + i] |=
+                    flags_[static_cast<size_t>(j) * columns + i + d];
+    flags_.assign(count, 0);
+    for (int j = 0; j < rows; ++j)
+        for (int d = std::max(-reach_ + 1, -j); d < std::min(reach_, rows - j); ++d)
+            for (int i = 0; i < columns; ++i)
+                flags_[static_cast<size_t>(j) * columns + i] |=
+                    flags_row_[static_cast<size_t>(j + d) * columns + i];
+}
+
+void Renderer::trace_samples(int u, int v, const Sample* samples, int count, uint8_t flags,
+                             uint8_t* hits) const {
+    const SightPatch patch = sight_patch(u, v);
+    const float top = robot_.top;
+    for (int i = 0; i < count; ++i) {
+        const Sight s = patch.at(samples[i].du, samples[i].dv);
+        const Pose& p = slots_[samples[i].slot];
+        if (flags & EDGE_SIDES) {
+            hits[i] = trace(s, p);
+        } else {
+            const float x = s.x + s.lx * top - p.x, y = s.y + s.ly * top - p.y;
+            hits[i] = trace_top(p.c * x + p.s * y, p.c * y - p.s * x);
+        }
+    }
+}
+
+void Renderer::shade_row(const Sight* floor, int count, float* shade) const {
     const float up = 0.5f * robot_.top;
-    const Sight towards{floor.x + scene_.lamp_x * up, floor.y + scene_.lamp_y * up, 0, 0};
-    const Sight body = in_body(towards, slots_[slots_.size() / 2]);
-    const float wide = robot_.half_track + robot_.wheel_half_width;
-    const float dx = std::max(std::fabs(body.x) - robot_.half_length, 0.0f);
-    const float dy = std::max(std::fabs(body.y) - wide, 0.0f);
-    const float t = std::clamp(1.0f - std::sqrt(dx * dx + dy * dy) / SHADE_REACH_M, 0.0f, 1.0f);
-    return 1.0f - scene_.shade * t * t * (3.0f - 2.0f * t);
+    const Pose p = slots_[slots_.size() / 2];
+    const float ox = scene_.lamp_x * up - p.x, oy = scene_.lamp_y * up - p.y;
+    const float half_x = robot_.half_length, half_y = robot_.half_track + robot_.wheel_half_width;
+    for (int i = 0; i < count; ++i) {
+        const float x = floor[i].x + ox, y = floor[i].y + oy;
+        const float dx = std::max(std::fabs(p.c * x + p.s * y) - half_x, 0.0f);
+        const float dy = std::max(std::fabs(p.c * y - p.s * x) - half_y, 0.0f);
+        const float t = std::max(1.0f - std::sqrt(dx * dx + dy * dy) / SHADE_REACH_M, 0.0f);
+        shade[i] = 1.0f - scene_.shade * t * t * (3.0f - 2.0f * t);
+    }
 }
 
 Colour Renderer::floor_sample(const Sight& s) const {
