@@ -92,16 +92,16 @@ def read_tree(name_or_path: str, kind: str) -> Tree:
         tree = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise BadInput(f"{where}: not valid TOML: {error}") from None
-    base = tree.pop("base", None)
-    if base is not None:
-        of_scenario = str(base) in builtin_names("scenarios")
-        below = read_tree(_beside(folder, str(base)), "scenarios" if of_scenario else "labs")
-        tree = merge(below, tree)
     for part in ("robot", "camera"):
         if isinstance(tree.get(part), Mapping) and "file" in tree[part]:
             own = dict(tree[part])
             below = read_tree(_beside(folder, str(own.pop("file"))), f"{part}s")
             tree[part] = merge(below, own)
+    base = tree.pop("base", None)
+    if base is not None:
+        of_scenario = str(base) in builtin_names("scenarios")
+        below = read_tree(_beside(folder, str(base)), "scenarios" if of_scenario else "labs")
+        tree = merge(below, tree)
     return tree
 
 
