@@ -39,7 +39,7 @@ class Board:
     def memory(self, address: int, size: int) -> bytes:
         """Return a piece of the data space (registers, I/O, RAM)."""
     def watch(self, trigger: int, address: int, size: int) -> None:
-        """Keep a copy of a piece of RAM after each step in which the byte at `trigger` changed."""
+        """Keep a copy of a piece of RAM one step after each in which the byte at `trigger` changed."""
     def take_watched(self) -> list[bytes]:
         """Return the copies kept since last asked."""
     def eeprom(self, size: int) -> bytes:

@@ -4,32 +4,84 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
 from hil.config.camera import CameraConfig
 from hil.config.events import Fault
 from hil.config.link import LinkConfig
+from hil.errors import BadInput
+from hil.firmware import find_toolchain
+from hil.targets.base import ByteStream
 from hil.types import Pose
 from hil.wire.link import BoardLink, WheelReport
-from sim_twin.pil import Pil
-from sim_twin.twin import Twin, TwinSetup
+from sim_twin.pil import Pil, pil_module
+from sim_twin.twin import HOST_START_S, TwinSetup
 from tests.twin.rigs import Drive, robot
 
 # Nothing behind the serial port: for tests of the board, not of the radio.
 WIRE = LinkConfig(latency_s=0.0, latency_jitter_s=0.0)
+# The board is up 35 ms after power-up; bytes sent before that are lost, on the robot too.
+BOOT_S = 0.1
+
+
+def _missing() -> str:
+    """Return what keeps the processor from being simulated here, with how to get it."""
+    try:
+        find_toolchain()
+        pil_module()
+    except BadInput as error:
+        return str(error)
+    return ""
+
+
+needs_toolchain = pytest.mark.skipif(bool(_missing()), reason=_missing())
+
+
+class Tap:
+    """A byte stream that keeps what the host writes."""
+
+    def __init__(self, stream: ByteStream) -> None:
+        self._stream = stream
+        self.written = b""
+
+    def read(self) -> bytes:
+        """Read through."""
+        return self._stream.read()
+
+    def write(self, data: bytes) -> None:
+        """Keep and pass on."""
+        self.written += data
+        self._stream.write(data)
 
 
 class PilDrive(Drive):
-    """The twin's test drive on the processor in the loop, or beside it on the twin."""
+    """The twin's test drive with the processor for a board, powered up and ready to talk."""
 
-    def __init__(
-        self, *, link: LinkConfig = WIRE, faults: tuple[Fault, ...] = (), on: type[Twin] = Pil,
-        **board: Any,
-    ) -> None:  # fmt: skip
-        setup = TwinSetup(robot(), link, CameraConfig(), Pose(0.0, 0.0, 0.0), 1, (), faults)
-        self.twin = on(setup, **board)
+    def __init__(self, *, faults: tuple[Fault, ...] = (), eeprom: bytes = b"", **link: Any) -> None:
+        setup = TwinSetup(
+            robot(),
+            WIRE.model_copy(update=link),
+            CameraConfig(),
+            Pose(0.0, 0.0, 0.0),
+            1,
+            faults=faults,
+        )
+        self.twin: Pil = Pil(setup, eeprom=eeprom)
+        self.board = self.twin.board
         self.link = BoardLink(self.twin.stream)
         self.reports: list[WheelReport] = []
+        self._until(HOST_START_S + BOOT_S)
+
+    def wait(self, seconds: float) -> None:
+        """Listen for a while without sending set-points."""
+        self._until(self.twin.now_s() + seconds)
 
     @property
-    def board(self) -> Any:
-        """The simulated board."""
-        return self.twin.board  # type: ignore[attr-defined]
+    def duties(self) -> tuple[float, float]:
+        """Share of the battery voltage on the motors now, left and right."""
+        return self.board.duty(0), self.board.duty(1)
+
+    @property
+    def texts(self) -> list[str]:
+        """What the board has said."""
+        return [text.text for text in self.link.texts]

@@ -174,10 +174,13 @@ void Chip::run_to(Cycle end) {
     arm_barrier();
   }
   check_alive();
-  if (watch_size_ != 0 && avr_->data[watch_trigger_] != watch_last_) {
-    watch_last_ = avr_->data[watch_trigger_];
-    watched_.push_back(memory(watch_address_, watch_size_));
-  }
+  if (watch_size_ != 0) look();
+}
+
+void Chip::look() {
+  if (watch_due_) watched_.push_back(memory(watch_address_, watch_size_));
+  watch_due_ = avr_->data[watch_trigger_] != watch_last_;
+  watch_last_ = avr_->data[watch_trigger_];
 }
 
 void Chip::watch(std::uint32_t trigger, std::uint32_t address, std::uint32_t size) {

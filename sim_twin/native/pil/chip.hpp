@@ -65,7 +65,8 @@ class Chip {
   std::string eeprom(std::uint32_t size) const;
   void set_eeprom(const std::string& bytes);
   int stack_used() const;             // deepest since power-up, bytes
-  // Keeps a copy of a piece of RAM whenever the byte at `trigger` has changed between two runs.
+  // Keeps a copy of a piece of RAM one run after the byte at `trigger` has changed between two, so
+  // that whatever was being written with it is complete.
   void watch(std::uint32_t trigger, std::uint32_t address, std::uint32_t size);
   std::vector<std::string>& watched() { return watched_; }
   const Usage& usage() const { return usage_; }
@@ -91,6 +92,7 @@ class Chip {
   void after_reset();
   void run_profiled();
   void check_alive() const;
+  void look();
   void arm_timers();
 
   static Cycle on_edges(avr_t*, Cycle when, void* self);
@@ -122,6 +124,7 @@ class Chip {
   bool interrupted_ = false;
   std::uint32_t watch_trigger_ = 0, watch_address_ = 0, watch_size_ = 0;
   std::uint8_t watch_last_ = 0;
+  bool watch_due_ = false;
   std::vector<std::string> watched_;
   Usage usage_;
   Profiler profiler_;
