@@ -20,7 +20,7 @@ from hil.types import Pose, PoseMeasurement
 from vision.calibration import figures
 from vision.calibration.files import read_camera, require_size
 from vision.camera import CameraModel
-from vision.cv_compat import dictionary_size, write_atomic
+from vision.cv_compat import dictionary_size, require_place, write_atomic
 from vision.marks import MarkLocaliser
 from vision.sources import ImageFolder, VideoFile
 from vision.tags import TagLocaliser
@@ -48,6 +48,8 @@ def localise(
     source: Path, camera_file: Path, tag_text: str | None, outputs: Outputs
 ) -> dict[str, Any]:
     """Localise every frame and return the summary; raises BadInput and then leaves no file."""
+    require_place(outputs.rows)
+    require_place(outputs.overlay, OVERLAY_SUFFIXES)
     config = read_camera(camera_file)
     frames = ImageFolder(source) if source.is_dir() else VideoFile(source)
     require_size(config, (frames.width_px, frames.height_px), str(camera_file), str(source))
@@ -160,14 +162,12 @@ class _Overlay:
         self._writer: cv2.VideoWriter | None = None
         if path is None:
             return
-        if path.suffix.lower() not in OVERLAY_SUFFIXES:
-            raise BadInput(f"{path}: an overlay is written as .avi or .mkv")
         self._part = path.with_name(f".{path.stem}.part{path.suffix}")
         code = cv2.VideoWriter.fourcc(*"MJPG")
         size = (model.width_px, model.height_px)
         self._writer = cv2.VideoWriter(str(self._part), code, rate_hz, size)
         if not self._writer.isOpened():
-            raise BadInput(f"{path}: cannot be written; is the folder there?")
+            raise BadInput(f"{path}: cannot be written as motion JPEG")
 
     def __enter__(self) -> _Overlay:
         return self

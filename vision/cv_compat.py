@@ -9,6 +9,7 @@ one BadInput line.
 from __future__ import annotations
 
 import os
+from collections.abc import Collection
 from pathlib import Path
 
 # Read by OpenCV's video backend when it opens its first file.
@@ -36,6 +37,7 @@ CELL_MARGIN_RATIO = 0.3
 CORNER_WINDOW_CELLS = 0.8
 
 IMAGE_SUFFIXES = {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"}
+PICTURE_SUFFIXES = (".png", ".jpg")
 _ENDINGS = {b"\xff\xd8": (b"\xff\xd9", "JPEG"), b"\x89PNG": (b"IEND", "PNG")}
 _ENDING_WITHIN_BYTES = 64
 
@@ -81,13 +83,19 @@ def read_image(path: Path) -> Image:
 
 def write_image(path: Path, image: Image) -> None:
     """Write the image in one step: the file is there complete, or not at all."""
-    try:
-        done, data = cv2.imencode(path.suffix or ".png", image)
-    except cv2.error:
-        done = False
-    if not done:
-        raise BadInput(f"{path}: cannot write this image format; use .png or .jpg")
+    require_place(path, PICTURE_SUFFIXES)
+    _, data = cv2.imencode(path.suffix, image)
     write_atomic(path, data.tobytes())
+
+
+def require_place(path: Path | None, suffixes: Collection[str] = ()) -> None:
+    """Raise BadInput where a file could not be written, before the work whose result it is."""
+    if path is None:
+        return
+    if not path.parent.is_dir():
+        raise BadInput(f"{path}: the folder {path.parent} does not exist; make it first")
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise BadInput(f"{path}: cannot be written as {path.suffix!r}; use {' or '.join(suffixes)}")
 
 
 def write_atomic(path: Path, data: bytes) -> None:

@@ -14,8 +14,6 @@ from hil.errors import BadInput
 if TYPE_CHECKING:
     from vision.calibration.boards import Board
     from vision.calibration.colours import Sample
-    from vision.calibration.floor import FloorCalibration
-    from vision.calibration.intrinsics import LensCalibration
     from vision.calibration.points import PointPairs
     from vision.calibration.views import Views
 
@@ -93,11 +91,13 @@ def camera(
     SOURCE is a folder of images, a video, or a camera INDEX. Hold the board still in all parts of
     the image, near and far, tilted by 20 to 40 degrees both ways.
     """
-    from vision.calibration import figures, files
+    from vision.calibration import figures, files, summary
     from vision.calibration.boards import parse_board
     from vision.calibration.intrinsics import calibrate_lens
-    from vision.cv_compat import write_image
+    from vision.cv_compat import PICTURE_SUFFIXES, require_place, write_image
 
+    require_place(camera_file)
+    require_place(picture, PICTURE_SUFFIXES)
     views = _views(source, parse_board(board_text, detector), wanted)
     result = calibrate_lens(views.views, views.size_px)
     if not result.held_out_px <= LENS_HELD_OUT_MAX_PX:
@@ -109,9 +109,9 @@ def camera(
     if picture is not None:
         write_image(picture, figures.coverage_picture(result))
     if as_json:
-        print_json(_lens_document(result, views, camera_file))
+        print_json(summary.lens_document(result, views.missed, camera_file))
     else:
-        click.echo(_lens_text(result, views, camera_file))
+        click.echo(summary.lens_text(result, views.missed, camera_file))
 
 
 def _views(source: str, board: Board, wanted: int) -> Views:
@@ -136,48 +136,6 @@ def _views(source: str, board: Board, wanted: int) -> Views:
         if path.is_dir()
         else views_of_video(board, path, report)
     )
-
-
-def _lens_document(result: LensCalibration, views: Views, file: Path) -> dict[str, Any]:
-    from vision.calibration.files import LENS_NAMES
-
-    return {
-        "camera_file": str(file),
-        "width_px": result.width_px,
-        "height_px": result.height_px,
-        "lens": dict(zip(LENS_NAMES, map(float, result.lens), strict=True)),
-        "sigma": dict(zip(LENS_NAMES, map(float, result.sigma), strict=True)),
-        "error_px": result.error_px,
-        "held_out_px": result.held_out_px,
-        "coverage_ratio": result.coverage_ratio,
-        "views": [
-            {"name": v.name, "corners": v.corners, "error_px": v.error_px,
-             "held_out_px": v.held_out_px, "tilt_deg": v.tilt_deg, "dropped": v.dropped}
-            for v in result.views
-        ],
-        "not_seen": views.missed,
-        "advice": list(result.advice),
-    }  # fmt: skip
-
-
-def _lens_text(result: LensCalibration, views: Views, file: Path) -> str:
-    fx, fy, cx, cy = result.lens[:4]
-    lines = [
-        f"lens at {result.width_px} x {result.height_px} px: focal length {fx:.2f} x {fy:.2f} px"
-        f" (sigma {result.sigma[0]:.2f}), centre ({cx:.2f}, {cy:.2f}) px",
-        "distortion k1 k2 p1 p2 k3: " + " ".join(f"{k:.5f}" for k in result.lens[4:]),
-        f"residual {result.error_px:.3f} px RMS, on held-out views {result.held_out_px:.3f} px RMS;"
-        f" image covered {result.coverage_ratio:.0%}",
-    ]
-    lines += [
-        f"dropped {v.name}: {v.error_px:.2f} px where the others have {result.error_px:.2f} px"
-        for v in result.views
-        if v.dropped
-    ]
-    if views.missed:
-        lines.append(f"board not seen in {', '.join(views.missed)}")
-    lines += [f"to make it better: {advice}" for advice in result.advice]
-    return "\n".join([*lines, f"written to {file}; next: hil calibrate floor"])
 
 
 @command.command()
@@ -220,10 +178,11 @@ def floor(
     SOURCE is an image or a folder of them; it may be left out with --points. Give exactly one of
     --board, --fiducials and --points.
     """
-    from vision.calibration import figures, files, views
+    from vision.calibration import figures, files, summary, views
     from vision.calibration.floor import FloorOptions, calibrate_floor
-    from vision.cv_compat import write_image
+    from vision.cv_compat import PICTURE_SUFFIXES, require_place, write_image
 
+    require_place(picture, PICTURE_SUFFIXES)
     if sum(option is not None for option in (board_text, fiducials, points)) != 1:
         raise BadInput("floor: give exactly one of --board, --fiducials and --points")
     images = list(views.floor_images(source)) if source is not None else []
@@ -245,16 +204,13 @@ def floor(
             images[0][1] if images else blank, result, config.marks.height_m
         )
         write_image(picture, drawn)
-    document = _floor_document(result, config.marks.height_m, camera_file)
+    document = summary.floor_document(result, config.marks.height_m, camera_file)
     if lens is None and height_m is None:
-        document["advice"].append(
-            "focal length and camera height cannot be told apart from floor points: give"
-            " --camera-height, or marks above the floor will be seen in the wrong place"
-        )
+        document["advice"].append(summary.HEIGHT_ADVICE)
     if as_json:
         print_json(document)
     else:
-        click.echo(_floor_text(document))
+        click.echo(summary.floor_text(document))
 
 
 def _lens_for(
@@ -333,40 +289,6 @@ def _numbers(text: str, count: int, option: str, example: str) -> list[float]:
     if len(values) != count or not all(map(math.isfinite, values)):
         raise BadInput(f"{option} {text!r}: not understood; for example {example}")
     return values
-
-
-def _floor_document(result: FloorCalibration, height_m: float, file: Path) -> dict[str, Any]:
-    from vision.calibration.floor import error_budget
-
-    return {
-        "camera_file": str(file),
-        "eye_m": [float(x) for x in result.camera.t_world_cam_m],
-        "points": len(result.pairs.names),
-        "rms_mm": result.rms_mm,
-        "held_out_rms_mm": result.held_out_rms_mm,
-        "held_out_max_mm": float(max(result.held_out_mm)),
-        "dropped": [{"name": name, "error_mm": error} for name, error in result.dropped],
-        "budget": error_budget(result.camera, height_m),
-        "advice": [],
-    }
-
-
-def _floor_text(document: dict[str, Any]) -> str:
-    x, y, z = document["eye_m"]
-    budget = document["budget"]
-    lines = [
-        f"camera at ({x:.4f}, {y:.4f}, {z:.4f}) m over the floor, from {document['points']} points",
-        f"residual {document['rms_mm']:.2f} mm RMS, on held-out points"
-        f" {document['held_out_rms_mm']:.2f} mm RMS, worst {document['held_out_max_mm']:.2f} mm",
-    ]
-    lines += [f"dropped {p['name']}: {p['error_mm']:.1f} mm off" for p in document["dropped"]]
-    lines.append(
-        f"at marks {budget['height_m'] * 1e3:.0f} mm up, over the image's centre and worst corner:"
-        f" 0.1 px is {budget['pixel_centre_mm']:.2f} and {budget['pixel_corner_mm']:.2f} mm,"
-        f" 3 mm of height {budget['height_centre_mm']:.2f} and {budget['height_corner_mm']:.2f} mm"
-    )
-    lines += [f"to make it better: {advice}" for advice in document["advice"]]
-    return "\n".join([*lines, f"written to {document['camera_file']}"])
 
 
 @command.command()

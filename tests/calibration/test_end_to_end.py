@@ -216,6 +216,11 @@ def bad_inputs(lab, made):
         "cut film": (localise, (made / "cut.mkv", *know, *keep), "cut off"),
         "small film": (localise, (made / "boards", "--camera-file", made / "big.toml", *keep),
                        "1280 x 720 px"),
+        "no folder for rows": (localise, (film, *know, "--out", made / "none" / "rows.csv", *keep[2:]),
+                               "does not exist"),
+        "overlay format": (localise, (film, *know, "--overlay", made / "overlay.gif"), ".avi or .mkv"),
+        "picture format": (calibrate, ("floor", robot, *tags, *know, "--picture", made / "a.gif"),
+                           ".png or .jpg"),
         "bad tag": (localise, (film, *know, "--tag", "7", *keep), "ID:SIZE_MM"),
     }  # fmt: skip
 
