@@ -26,6 +26,7 @@ class PlantParams:
     """Parameters of the robot model; the names in PARAMETERS, all floats, all 0 at first."""
 
     slip: bool
+    lifted: bool
     def __setattr__(self, name: str, value: float, /) -> None: ...
     def __getattr__(self, name: str, /) -> float: ...
 

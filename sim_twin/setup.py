@@ -25,6 +25,7 @@ def plant_params(robot: RobotConfig) -> _native.PlantParams:
         owner = getattr(robot, group) if group in _GROUPS else robot
         setattr(params, name, float(getattr(owner, rest if group in _GROUPS else name)))
     params.slip = robot.variant == "slip"
+    params.lifted = robot.variant == "lifted"
     return params
 
 

@@ -35,6 +35,8 @@ FaultKind = Literal[
     "swapped_phases",  # A and B exchanged: counts run backward
     "motor_reversed",  # polarity of one side's motors
     "motor_stuck",  # one side's gears jam
+    "motors_exchanged",  # leads of left and right motors
+    "encoders_exchanged",  # plugs of left and right encoders
     "board_reset",  # board held in reset from start to end, then boots anew
     "link_cut",  # nothing passes either way
     "camera_stall",  # no frames

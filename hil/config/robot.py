@@ -78,8 +78,9 @@ class RobotConfig(Section):
     """A four-wheel skid-steer robot, two driven wheels a side (control.md section 1)."""
 
     name: str = Field(min_length=1, max_length=60)
-    variant: Literal["constrained", "slip"] = Field(
-        description="constrained: eta2 = -d0 theta_dot (2.31) and rolling wheels; slip: neither"
+    variant: Literal["constrained", "slip", "lifted"] = Field(
+        description="constrained: eta2 = -d0 theta_dot (2.31) and rolling wheels; slip: neither; "
+        "lifted: on blocks, the wheels turn freely"
     )
     mass_kg: float = Field(ge=0.5, le=50, description="m")
     inertia_kg_m2: float = Field(

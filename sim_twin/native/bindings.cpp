@@ -51,7 +51,8 @@ void bind_plant(nb::module_& m) {
 #define X(name) .def_rw(#name, &PlantParams::name)
       TWIN_PLANT_PARAMETERS(X)
 #undef X
-      .def_rw("slip", &PlantParams::slip);
+      .def_rw("slip", &PlantParams::slip)
+      .def_rw("lifted", &PlantParams::lifted);
 
   using twin::LoadVector;
   using twin::Plant;

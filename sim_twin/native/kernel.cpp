@@ -102,8 +102,9 @@ void Kernel::follow_reset_line() {
 }
 
 void Kernel::set_drive() {
-  drive_.duty_left = board_->duty(0) * (fault_.side[0].reversed ? -1.0 : 1.0);
-  drive_.duty_right = board_->duty(1) * (fault_.side[1].reversed ? -1.0 : 1.0);
+  const int other = fault_.motors_exchanged ? 1 : 0;
+  drive_.duty_left = board_->duty(other) * (fault_.side[0].reversed ? -1.0 : 1.0);
+  drive_.duty_right = board_->duty(1 - other) * (fault_.side[1].reversed ? -1.0 : 1.0);
   drive_.jam_left = fault_.side[0].stuck ? kJam_n_m_s_rad : 0.0;
   drive_.jam_right = fault_.side[1].stuck ? kJam_n_m_s_rad : 0.0;
 }
@@ -142,7 +143,8 @@ void Kernel::step() {
   }
   edges_.clear();
   for (int side = 0; side < 2; ++side) {
-    encoders_[side].move(x[kWheelL + side], t0_us, h_us, fault_.side[side], side, edges_);
+    const int port = fault_.encoders_exchanged ? 1 - side : side;
+    encoders_[side].move(x[kWheelL + side], t0_us, h_us, fault_.side[side], port, edges_);
   }
   std::stable_sort(edges_.begin(), edges_.end(),
                    [](const PinEdge& a, const PinEdge& b) { return a.t_us < b.t_us; });

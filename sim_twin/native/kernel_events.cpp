@@ -73,6 +73,8 @@ FaultState Faults::at(double t_s) const {
   for (const Fault& fault : items_) {
     if (t_s < fault.start_s || t_s >= fault.end_s) continue;
     if (fault.kind == FaultKind::kBoardReset) out.board_in_reset = true;
+    if (fault.kind == FaultKind::kMotorsExchanged) out.motors_exchanged = true;
+    if (fault.kind == FaultKind::kEncodersExchanged) out.encoders_exchanged = true;
     for (int i = 0; i < 2; ++i) {
       if (!(i == 0 ? fault.left : fault.right)) continue;
       FaultState::Side& side = out.side[i];
@@ -83,6 +85,8 @@ FaultState Faults::at(double t_s) const {
         case FaultKind::kSwappedPhases: side.swapped = true; break;
         case FaultKind::kMotorReversed: side.reversed = true; break;
         case FaultKind::kMotorStuck: side.stuck = true; break;
+        case FaultKind::kMotorsExchanged:
+        case FaultKind::kEncodersExchanged:
         case FaultKind::kBoardReset: break;
       }
     }

@@ -46,6 +46,8 @@ class Disturbances {
   X(kSwappedPhases, "swapped_phases")   \
   X(kMotorReversed, "motor_reversed")   \
   X(kMotorStuck, "motor_stuck")         \
+  X(kMotorsExchanged, "motors_exchanged")     \
+  X(kEncodersExchanged, "encoders_exchanged") \
   X(kBoardReset, "board_reset")
 enum class FaultKind : int {
 #define X(id, name) id,
@@ -66,6 +68,7 @@ struct FaultState {
   };
   Side side[2];
   bool board_in_reset = false;
+  bool motors_exchanged = false, encoders_exchanged = false;  // left with right
 };
 
 class Faults {

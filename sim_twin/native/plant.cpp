@@ -103,7 +103,9 @@ StateVector Plant::derivative(const StateVector& x, const Drive& drive,
   dx[kWheelL] = x[kOmegaL];
   dx[kWheelR] = x[kOmegaR];
   dx[kCharge] = -d_.per_charge * draw_a(x, drive);
-  if (p_.slip) {
+  if (p_.lifted) {
+    hanging(sides, dx);
+  } else if (p_.slip) {
     slipping(x, sides, load, gravity, dx);
   } else {
     constrained(x, sides, load, gravity, dx);
@@ -175,6 +177,13 @@ void Plant::slipping(const StateVector& x, const SideForces* sides, const LoadVe
   dx[kThetaDot] = (moment + load[kTorqueYaw]) / p_.inertia_kg_m2 + load[kAccYaw];
 }
 
+// On blocks: each side turns its own wheels and rotors, and nothing pushes the body.
+void Plant::hanging(const SideForces* sides, StateVector& dx) const {
+  for (int side = 0; side < 2; ++side) {
+    dx[kOmegaL + side] = sides[side].torque_n_m / d_.side_inertia;
+  }
+}
+
 void Plant::apply_constraint(StateVector& x) const {
   const double half = 0.5 * p_.track_m;
   x[kEta2] = -p_.d0_m * x[kThetaDot];
@@ -196,7 +205,7 @@ void Plant::step(double h_s, const Drive& drive, const LoadVector& begin,
   for (int i = 0; i < kStates; ++i) {
     x_[i] += h_s / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
   }
-  if (!p_.slip) apply_constraint(x_);  // keeps rounding from adding up; the slopes agree already
+  if (!p_.slip && !p_.lifted) apply_constraint(x_);  // keeps rounding from adding up; the slopes agree already
 }
 
 }  // namespace twin

@@ -25,7 +25,8 @@ struct PlantParams {
 #define X(name) double name = 0.0;
   TWIN_PLANT_PARAMETERS(X)
 #undef X
-  bool slip = false;  // false: operative constraint (2.31) and rolling wheels
+  bool slip = false;    // false: operative constraint (2.31) and rolling wheels
+  bool lifted = false;  // wheels off the floor: they turn, the body stands
 };
 
 // Index of each state in the vector that is integrated.
@@ -112,6 +113,7 @@ class Plant {
                    const double* gravity, StateVector& dx) const;
   void slipping(const StateVector& x, const SideForces* sides, const LoadVector& load,
                 const double* gravity, StateVector& dx) const;
+  void hanging(const SideForces* sides, StateVector& dx) const;
   void apply_constraint(StateVector& x) const;
 
   PlantParams p_;
