@@ -10,7 +10,7 @@ bool was_armed();
 // Kept through a reset, which does not clear the RAM; to be called every tick.
 void remember_armed(bool armed);
 
-// From now on a main loop that does not call feed() for 60 ms resets the board.
+// From now on a main loop that does not call feed() for 64 ms resets the board.
 void start_watchdog();
 void feed_watchdog();
 
