@@ -32,7 +32,7 @@ def open_rig(target: str, scenario: Scenario, camera: str, seed: int) -> Rig:
         from hil.targets.serial import SerialRig, parse_target  # noqa: PLC0415
 
         device, baud = parse_target(target)
-        return SerialRig(device, baud, open_source(camera))
+        return SerialRig(device, baud, open_source(camera, scenario.camera))
     raise BadInput(f"target {target!r}: unknown; choose twin, pil or serial:DEV[@BAUD]")
 
 

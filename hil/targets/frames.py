@@ -15,13 +15,16 @@ import time
 from collections import deque
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from hil.errors import BadInput, RigFault
 from hil.targets.base import Frame
 from hil.types import Pose, PoseMeasurement
+
+if TYPE_CHECKING:
+    from hil.config.camera import CameraConfig
 
 TWIN_PREFIX = "twin:"
 # A host that falls behind wants the newest frames; older ones are as good as dropped.
@@ -41,14 +44,18 @@ class FrameSource(Protocol):
         """Release the camera; safe to call twice."""
 
 
-def open_source(text: str) -> FrameSource:
-    """Return the source that `--camera` names: INDEX, FILE or twin:SOCKET. Raises RigFault."""
+def open_source(text: str, wanted: CameraConfig | None = None) -> FrameSource:
+    """Return the source that `--camera` names: INDEX, FILE or twin:SOCKET.
+
+    A live camera is asked for the size and rate `wanted`. Raises BadInput or RigFault.
+    """
     if text.startswith(TWIN_PREFIX):
         return SocketSource(text.removeprefix(TWIN_PREFIX))
     if text.isdigit():
-        from vision.sources import LiveCamera  # noqa: PLC0415 - most runs have no camera
+        from vision.sources import CameraControls, LiveCamera  # noqa: PLC0415 - most runs have none
 
-        return LiveCamera(int(text))
+        size = (wanted.width_px, wanted.height_px, wanted.rate_hz) if wanted else ()
+        return LiveCamera(int(text), CameraControls(*size))
     if Path(text).is_file():
         return CaptureSource(text)
     raise BadInput(
