@@ -35,7 +35,8 @@ def pil_module() -> type[_pil.Board]:
 class Pil(Twin):
     """One simulated rig whose board is the firmware itself; `board` gives access to its insides.
 
-    `eeprom` is what the EEPROM holds at first power-up, the rest of it erased.
+    `eeprom` is what the EEPROM holds at first power-up, the rest of it erased; `uart` is the port
+    the host is on, "0" for USB and "1" for Bluetooth.
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class Pil(Twin):
         *,
         firmware: Path | None = None,
         eeprom: bytes = b"",
+        uart: str = "1",
     ) -> None:
         if setup.link.baud != UART_BAUD:
             raise BadInput(
@@ -53,7 +55,7 @@ class Pil(Twin):
             )
         self.build: Build | None = None if firmware else build()
         elf = firmware if self.build is None else self.build.elf
-        self.board = pil_module()(str(elf), "1", setup.robot.board_clock_ppm, eeprom)
+        self.board = pil_module()(str(elf), uart, setup.robot.board_clock_ppm, eeprom)
         super().__init__(setup, maker, self.board.handle())
 
     @property

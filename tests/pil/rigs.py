@@ -57,16 +57,23 @@ class Tap:
 class PilDrive(Drive):
     """The twin's test drive with the processor for a board, powered up and ready to talk."""
 
-    def __init__(self, *, faults: tuple[Fault, ...] = (), eeprom: bytes = b"", **link: Any) -> None:
+    def __init__(
+        self,
+        *,
+        link: LinkConfig = WIRE,
+        faults: tuple[Fault, ...] = (),
+        board_clock_ppm: float = 0.0,
+        **board: Any,
+    ) -> None:
         setup = TwinSetup(
-            robot(),
-            WIRE.model_copy(update=link),
+            robot(board_clock_ppm=board_clock_ppm),
+            link,
             CameraConfig(),
             Pose(0.0, 0.0, 0.0),
             1,
             faults=faults,
         )
-        self.twin: Pil = Pil(setup, eeprom=eeprom)
+        self.twin: Pil = Pil(setup, **board)
         self.board = self.twin.board
         self.link = BoardLink(self.twin.stream)
         self.reports: list[WheelReport] = []

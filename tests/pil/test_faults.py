@@ -14,9 +14,9 @@ pytestmark = needs_toolchain
 SPEED_RAD_S = 6.0
 
 
-def moving(*faults, **link):
+def moving(*faults):
     """Return a drive that has run at 6 rad/s for a second; faults count from then."""
-    drive = PilDrive(faults=faults, **link)
+    drive = PilDrive(faults=faults)
     drive.arm()
     drive.run(1.0, SPEED_RAD_S, SPEED_RAD_S)
     assert drive.twin.truth().eta1_m_s > 0.2

@@ -1,0 +1,61 @@
+"""What the firmware may cost its processor; the limits are the requirement's, kept with a margin."""
+
+import pytest
+
+from hil.firmware import FLASH_LIMIT_BYTES, RAM_LIMIT_BYTES
+from sim_twin.firmware_cost import CLOCK_HZ, TICKS_PER_S, measure
+from tests.pil.rigs import needs_toolchain
+from tests.twin.rigs import robot
+
+pytestmark = needs_toolchain
+
+MARGIN = 0.95
+STACK_LIMIT_BYTES = 1024
+# A byte at 57,600 baud lasts 2,778 cycles and the UART holds two; edges of one wheel at 8,000 a
+# second are 2,000 cycles apart. A tenth of that is little, and more than a handler ever needs.
+INTERRUPTS_OFF_CYCLES = 200
+
+
+@pytest.fixture(scope="module")
+def cost():
+    """Return the measured cost."""
+    return measure(robot())
+
+
+def test_memory(cost):
+    """Flash at most 48 KB, static RAM at most 4 KB, stack at most 1 KB below its paint."""
+    assert 10_000 < cost.flash_bytes <= MARGIN * FLASH_LIMIT_BYTES
+    assert 1_000 < cost.ram_bytes <= MARGIN * RAM_LIMIT_BYTES
+    assert 100 < cost.stack_bytes <= MARGIN * STACK_LIMIT_BYTES
+
+
+def test_tick_and_link_take_at_most_two_fifths_of_the_processor(cost):
+    """Both wheels at 250 Hz, all traffic included, while set-points change at 30 Hz."""
+    assert 0.1 < cost.tick_and_link_ratio <= MARGIN * 0.40, cost.cycles_per_tick
+
+
+def test_the_parts_add_up_to_the_time_awake(cost):
+    """No cycle is missing from the table: its sum is the time not asleep, measured apart."""
+    total = sum(cost.cycles_per_tick.values()) * TICKS_PER_S / CLOCK_HZ
+    assert total == pytest.approx(cost.awake_ratio, abs=0.01)
+
+
+def test_encoder_interrupt(cost):
+    """At most 100 cycles from the edge's response to the return, whatever the transition."""
+    assert 40 < cost.encoder_interrupt_cycles <= MARGIN * 100
+
+
+def test_no_edge_is_lost_at_full_speed(cost):
+    """8,000 edges a second on both wheels, armed and under full traffic: every one is counted."""
+    assert cost.edges_lost == 0
+    assert cost.awake_full_ratio < 0.6
+
+
+def test_interrupts_are_never_off_for_long(cost):
+    """Longest stretch with interrupts off, handlers included."""
+    assert 30 < cost.interrupts_off_cycles <= INTERRUPTS_OFF_CYCLES
+
+
+def test_the_longest_tick_leaves_room(cost):
+    """The board's own account of its longest tick, interrupts during it included."""
+    assert 500 < cost.longest_tick_us < 0.6 * 4000
