@@ -22,6 +22,7 @@ COMMANDS = {
     "compare": ("hil.cli.compare", "Compare recorded runs: table, JSON and HTML report."),
     "replay": ("hil.cli.replay", "Replay a record exactly, or with another law as its shadow."),
     "view": ("hil.cli.view", "Open recorded runs in the viewer."),
+    "sweep": ("hil.cli.sweep", "Run a campaign over grids, lists and distributions; draw maps."),
     "tune": ("hil.cli.tune", "Tune the gains of both laws by one procedure and budget."),
     "twin": ("hil.cli.twin", "Serve the digital twin to other programs."),
     "firmware": ("hil.cli.firmware", "Generate, build, upload and configure the firmware."),

@@ -24,3 +24,29 @@ def run_progress(durations_s: Mapping[str, float]) -> Iterator[Update]:
     with Progress(*columns, console=console, disable=not console.is_terminal) as bars:
         tasks = {name: bars.add_task(name, total=total) for name, total in durations_s.items()}
         yield lambda name, t_s: bars.update(tasks[name], completed=t_s)
+
+
+@contextmanager
+def job_progress(name: str) -> Iterator[Callable[[int, int], None]]:
+    """Show one bar for many jobs; `update(done, total)` moves it. Nothing is shown off a terminal."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bars:
+        task = bars.add_task(name, total=None)
+        yield lambda done, total: bars.update(task, completed=done, total=total)

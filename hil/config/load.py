@@ -155,6 +155,11 @@ def set_value(tree: Tree, text: str) -> None:
     key = key.strip()
     if not equals:
         raise BadInput(f"--set {text!r}: needs KEY=VALUE, for example robot.mass_kg=3.1")
+    put_value(tree, key, parse_value(value_text))
+
+
+def put_value(tree: Tree, key: str, value: Any) -> None:
+    """Put a value where the dotted name says, in place; an unknown one is a BadInput."""
     names = dotted_names(tree)
     parent, leaf = _find(tree, key)
     if parent is None:
@@ -162,7 +167,7 @@ def set_value(tree: Tree, text: str) -> None:
         same_end = [name for name in names if name.split(".")[-1] == key.split(".")[-1]]
         hint = " or ".join(dict.fromkeys([*same_end[:2], *near])) or f"top level: {', '.join(tree)}"
         raise BadInput(f"--set {key}: no such value; near: {hint}")
-    parent[leaf] = parse_value(value_text)
+    parent[leaf] = value
 
 
 def _find(tree: Tree, key: str) -> tuple[Any, Any]:
@@ -170,6 +175,9 @@ def _find(tree: Tree, key: str) -> tuple[Any, Any]:
     node: Any = tree
     parts = key.split(".")
     for depth, part in enumerate(parts):
+        rest = ".".join(parts[depth:])
+        if isinstance(node, dict) and rest in node:  # a key may have dots itself (mismatch)
+            return node, rest
         index: Any = int(part) if isinstance(node, list) and part.isdigit() else part
         last = depth == len(parts) - 1
         if isinstance(node, dict) and index in node:

@@ -153,5 +153,6 @@ def git_revision() -> str:
 
 def command_line() -> str:
     """Return the command that started this process, as a person would type it."""
-    words = [Path(sys.argv[0]).name, *sys.argv[1:]]
+    program = Path(sys.argv[0]).name
+    words = ["hil" if program == "__main__.py" else program, *sys.argv[1:]]
     return " ".join(f"'{word}'" if " " in word else word for word in words)

@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 
 # Stand-ins that matplotlib writes and the page replaces by a variable of its style sheet.
 INK, _FAINT = "#010203", "#a1a2a3"
-_RUNS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+RUNS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 _VARIABLES = {INK: "var(--ink)", _FAINT: "var(--grid)"} | {
-    colour: f"var(--run-{number})" for number, colour in enumerate(_RUNS)
+    colour: f"var(--run-{number})" for number, colour in enumerate(RUNS)
 }
 _LAW_COLOURS = {"pid": 0, "asg-ism": 1}
 _WIDTH_IN = 7.4
@@ -79,7 +79,7 @@ class Trace:
     @property
     def paint(self) -> str:
         """Return the stand-in colour that becomes a CSS variable."""
-        return _RUNS[self.colour]
+        return RUNS[self.colour]
 
 
 def traces(entries: Sequence[Entry]) -> list[Trace]:
@@ -92,7 +92,7 @@ def traces(entries: Sequence[Entry]) -> list[Trace]:
     return [
         Trace(
             entry.label if laws.count(law) == 1 or not by_law else law,
-            _LAW_COLOURS[law] if by_law else index % len(_RUNS),
+            _LAW_COLOURS[law] if by_law else index % len(RUNS),
             entry.run.samples,
         )
         for index, (entry, law) in enumerate(zip(entries, laws, strict=True))
@@ -286,7 +286,7 @@ def _circle_tracking(circle: CircleStudy) -> str:
             t_s, z1_m, wanted_m = _thin(run.t_s, run.z1_m[:, panel], run.z1_ref_m[:, panel])
             if number == 0:
                 axes.plot(t_s, wanted_m, "--", color=INK, lw=0.8, label="reference z1*")
-            axes.plot(t_s, z1_m, color=_RUNS[number], lw=1.0, label=list(circle.runs)[number])
+            axes.plot(t_s, z1_m, color=RUNS[number], lw=1.0, label=list(circle.runs)[number])
         sheet.label(panel, f"z1,{'XY'[panel]} in m")
     return sheet.svg("circle-tracking")
 
@@ -298,8 +298,8 @@ def _circle_pair(circle: CircleStudy, key: str, titles: tuple[str, str], factor:
         square = (getattr(run, key) ** 2).sum(axis=1)
         total = np.cumsum(square) * (run.t_s[1] - run.t_s[0])
         t_s, square, total = _thin(run.t_s, square * factor, total)
-        sheet.axes[0].semilogy(t_s, square, color=_RUNS[number], lw=1.0, label=label)
-        sheet.axes[1].plot(t_s, total, color=_RUNS[number], label=label)
+        sheet.axes[0].semilogy(t_s, square, color=RUNS[number], lw=1.0, label=label)
+        sheet.axes[1].plot(t_s, total, color=RUNS[number], label=label)
     sheet.label(0, titles[0])
     sheet.label(1, titles[1])
     return sheet.svg(f"circle-{key}")
@@ -311,7 +311,7 @@ def _circle_sliding(circle: CircleStudy) -> str:
     for number, (label, run) in enumerate(circle.runs.items()):
         norm = np.hypot(run.s[:, 0], run.s[:, 1])
         if np.isfinite(norm).all():
-            axes.plot(*_thin(run.t_s, norm), color=_RUNS[number], lw=0.9, label=f"‖s‖, {label}")
+            axes.plot(*_thin(run.t_s, norm), color=RUNS[number], lw=0.9, label=f"‖s‖, {label}")
     axes.axhline(circle.layer_m_s2, color=INK, lw=0.8, ls=":", label="layer ε")
     axes.set_ylim(0.0, None)
     sheet.label(0, "‖s‖ in m/s²")

@@ -77,11 +77,11 @@ def repeats_of(runs: Sequence[RunRecord]) -> Repeats | None:
     arms: dict[Arm, dict[int, RunRecord]] = {}
     for run in runs:
         arms.setdefault(arm_of(run), {})[run.manifest.seed] = run
-    arms = dict(sorted(arms.items(), key=lambda item: [_rank(law) for law in item[0]]))
+    arms = dict(sorted(arms.items(), key=lambda item: [law_rank(law) for law in item[0]]))
     common = sorted(set.intersection(*(set(by_seed) for by_seed in arms.values())))
     if len(arms) < 2 or len(common) < 2:
         return None
-    names = _arm_names(list(arms))
+    names = arm_names(list(arms))
     paired_runs = {arm: {seed: by_seed[seed] for seed in common} for arm, by_seed in arms.items()}
     figures = {
         arm: {seed: run.figures().values for seed, run in by_seed.items()}
@@ -115,12 +115,13 @@ def repeats_of(runs: Sequence[RunRecord]) -> Repeats | None:
     )
 
 
-def _rank(law: str) -> tuple[int, str]:
+def law_rank(law: str) -> tuple[int, str]:
+    """Return what sorts laws so that the baseline comes first."""
     known = _BASELINE_ORDER.index(law) if law in _BASELINE_ORDER else len(_BASELINE_ORDER)
     return known, law
 
 
-def _arm_names(arms: Sequence[Arm]) -> dict[Arm, str]:
+def arm_names(arms: Sequence[Arm]) -> dict[Arm, str]:
     """Return what tells the arms apart: the law that varies, or both."""
     for index in (0, 1):
         if len({arm[1 - index] for arm in arms}) == 1:

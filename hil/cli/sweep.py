@@ -1,0 +1,66 @@
+"""`hil sweep`: a campaign of many runs over grids, lists and distributions of values."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from hil.cli.options import json_option, print_json
+
+
+@click.command("sweep")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
+              help="Folder for the results; that of the same campaign goes on where it stopped. "
+              "[default: a new one in runs/]")  # fmt: skip
+@click.option("--workers", type=click.IntRange(1, 1024),
+              help="Processes on this machine. [default: one a core]")  # fmt: skip
+@click.option("--dask", metavar="ADDRESS", help="Dask scheduler to use instead of own processes.")
+@json_option
+def command(
+    file: Path, out: Path | None, workers: int | None, dask: str | None, as_json: bool
+) -> int:
+    """Run the campaign of FILE (TOML) and draw what depends on what.
+
+    Every combination of the values in [grid] and [[together]], `draws` draws of [random], `seeds`
+    seeds and all laws; runs are kept in memory, one row each goes to results.parquet.
+    """
+    from hil.cli.progress import job_progress
+    from hil.record.manifest import command_line
+    from hil.run import new_folder
+    from hil.sweep.answers import documents, outcomes_of, sentences
+    from hil.sweep.campaign import load_campaign
+    from hil.sweep.maps import write_page
+    from hil.sweep.work import run_campaign
+
+    campaign = load_campaign(file)
+    folder = out or new_folder(f"sweep-{campaign.file.name}")
+    with job_progress(campaign.file.name) as update:
+        table, totals = run_campaign(campaign, folder, workers, dask, update)
+    outcomes = outcomes_of(campaign, table)
+    page = folder / "report.html"
+    write_page(page, outcomes, command_line())
+    efficiency = totals.efficiency
+    document: dict[str, Any] = {
+        "campaign": campaign.file.name,
+        "sha256": campaign.digest,
+        "results": str(folder / "results.parquet"),
+        "report": str(page),
+        "runs": totals.runs,
+        "runs_now": totals.runs_now,
+        "wall_s": round(totals.wall_s, 3),
+        "workers": totals.workers,
+        "parallel_efficiency": round(efficiency, 4) if efficiency is not None else None,
+        "answers": list(documents(outcomes)),
+    }
+    if as_json:
+        print_json(document)
+        return 0
+    told = f", {efficiency:.0%} of the workers' time spent on runs" if efficiency else ""
+    click.echo(f"{totals.runs} runs, {totals.runs_now} of them now in {totals.wall_s:.1f} s{told}")
+    for line in sentences(outcomes):
+        click.echo(f"- {line}")
+    click.echo(f"results: {document['results']}\nreport: {page}")
+    return 0

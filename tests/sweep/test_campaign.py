@@ -1,0 +1,93 @@
+"""A campaign file becomes the runs it says, and every mistake in it is one line."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from hil.errors import BadInput
+from hil.sweep.campaign import Campaign, Distribution, Range, load_campaign
+
+
+def campaign(folder: Path, text: str) -> Campaign:
+    path = folder / "campaign.toml"
+    path.write_text(f'scenario = "scenario-1"\n{text}', encoding="utf-8")
+    return load_campaign(path)
+
+
+def test_runs_are_the_product_of_grid_lists_draws_seeds_and_laws(tmp_path: Path) -> None:
+    """2 grid points x 3 in step x 2 draws x 2 seeds x 2 laws = 48 runs, laws beside each other."""
+    found = campaign(
+        tmp_path,
+        """
+        seeds = 2
+        draws = 2
+        [grid.link]
+        latency_s = [0.01, 0.02]
+        [[together]]
+        "camera.latency_s" = [0.05, 0.06, 0.07]
+        "link.latency_jitter_s" = [0.0, 0.005, 0.01]
+        [random]
+        "robot.mass_kg" = { kind = "uniform", low = 2.0, high = 3.0 }
+        """,
+    )
+    jobs = found.jobs()
+    assert len(jobs) == 48
+    assert [job.index for job in jobs] == list(range(48))
+    first, second = jobs[0], jobs[1]
+    assert (first.outer, second.outer) == ("pid", "asg-ism")
+    assert (first.point, first.seed, first.draw) == (second.point, second.seed, second.draw)
+    in_step = {
+        (dict(j.point)["camera.latency_s"], dict(j.point)["link.latency_jitter_s"]) for j in jobs
+    }
+    assert in_step == {(0.05, 0.0), (0.06, 0.005), (0.07, 0.01)}
+    masses = {(job.draw, dict(job.point)["robot.mass_kg"]) for job in jobs}
+    assert len(masses) == 2  # a draw is the same at every point and for every law
+    assert found.scenario(first.point).link.latency_s == 0.01
+
+
+def test_ranges_and_distributions() -> None:
+    """Both ends belong to a range; equal ratios on a log scale; draws stay in their bounds."""
+    assert Range(first=0, last=1, count=5).points() == [0, 0.25, 0.5, 0.75, 1]
+    log = Range(first=0.01, last=1, count=3, scale="log").points()
+    assert log == pytest.approx([0.01, 0.1, 1.0])
+    rng = Random(3)
+    uniform = Distribution(kind="uniform", low=2, high=4)
+    values = [uniform.draw(rng) for _ in range(2000)]
+    assert 2 <= min(values) < max(values) <= 4
+    assert statistics.fmean(values) == pytest.approx(3.0, abs=0.05)
+    loguniform = Distribution(kind="loguniform", low=0.01, high=1)
+    logs = [math.log10(loguniform.draw(rng)) for _ in range(2000)]
+    assert statistics.fmean(logs) == pytest.approx(-1.0, abs=0.05)
+    normal = Distribution(kind="normal", mean=1, sd=0.5, low=0)
+    assert min(normal.draw(rng) for _ in range(2000)) == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('[grid]\n"link.latencyy_s" = [1]', "link.latency_s"),
+        ('[grid]\n"link.latency_s" = [0.01, -1]', "link.latency_s = -1"),
+        ('[grid]\n"link.latency_s" = { first = 1, last = 2, count = 1 }', "count"),
+        ("seedz = 3", "unknown key 'seedz'; near: seed"),
+        ("draws = 3", "nothing to draw"),
+        ('figures = ["ise"]', "no such figure"),
+        ('[[together]]\n"link.latency_s" = [0.1]\n"link.baud" = [9600, 57600]', "differ in length"),
+        (
+            '[grid]\n"robot.mass_kg" = [3]\n[random."robot.mass_kg"]\nkind = "normal"',
+            "varied twice",
+        ),
+        ('[random."robot.mass_kg"]\nkind = "uniform"', "needs low and high"),
+        ("[grid", "not valid TOML"),
+    ],
+)
+def test_mistakes_are_named(tmp_path: Path, text: str, said: str) -> None:
+    """Each is refused before anything runs."""
+    with pytest.raises(BadInput) as refusal:
+        campaign(tmp_path, text)
+    assert said in str(refusal.value)
+    assert "\n" not in str(refusal.value)

@@ -1,0 +1,136 @@
+"""Campaigns run to their end whatever happens on the way, with the same results everywhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from hil.errors import BadInput, RigFault
+from hil.metrics import METRICS
+from hil.run import RunSpec, execute
+from hil.sweep.answers import documents, outcomes_of, sentences
+from hil.sweep.campaign import Campaign, load_campaign
+from hil.sweep.crew import in_processes, on_dask
+from hil.sweep.maps import write_page
+from hil.sweep.results import ResultStore
+from hil.sweep.work import Worker, run_campaign
+from tests.sweep.deadly import DiesOnce, always_dies
+
+TEXT = """
+scenario = "scenario-1"
+set = ["duration_s=0.6"]
+seeds = 2
+[grid]
+"link.latency_s" = [0.01, 0.05]
+"camera.latency_s" = [0.05, 0.08]
+"""
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    """16 runs of 0.6 s."""
+    path = tmp_path_factory.mktemp("sweep") / "delays.toml"
+    path.write_text(TEXT, encoding="utf-8")
+    return load_campaign(path)
+
+
+@pytest.fixture(scope="module")
+def finished(campaign: Campaign, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Run it on two processes."""
+    folder = tmp_path_factory.mktemp("sweep") / "results"
+    run_campaign(campaign, folder, workers=2)
+    return folder
+
+
+def test_rows_are_the_figures_of_full_runs(
+    campaign: Campaign, finished: Path, tmp_path: Path
+) -> None:
+    """A run kept in memory has exactly the figures of the same run with a record."""
+    row = pq.read_table(finished / "results.parquet").to_pylist()[5]
+    job = campaign.jobs()[5]
+    spec = RunSpec(
+        campaign.scenario(job.point), "twin", "pose", job.outer, job.inner, job.seed,
+        tmp_path / "run", rerun=False,
+    )  # fmt: skip
+    values = execute(spec).figures().values
+    for metric in METRICS:
+        value = values[metric.name]
+        assert row[metric.name] == (None if math.isnan(value) else value), metric.name
+
+
+def test_interrupted_campaign_goes_on(campaign: Campaign, finished: Path, tmp_path: Path) -> None:
+    """Rows of an earlier attempt are not run again, and the file is the same, byte for byte."""
+    folder = tmp_path / "again"
+    store = ResultStore(folder, campaign)
+    for job in campaign.jobs()[3:9]:
+        store.add(Worker(campaign)(job).row)
+    store.flush()
+    calls: list[tuple[int, int]] = []
+    _, totals = run_campaign(campaign, folder, 2, progress=lambda a, b: calls.append((a, b)))
+    assert totals.runs_now == 10
+    assert calls[-1] == (16, 16)
+    assert (folder / "results.parquet").read_bytes() == (finished / "results.parquet").read_bytes()
+    _, totals = run_campaign(campaign, folder, 2)
+    assert totals.runs_now == 0
+
+
+def test_cluster_gives_the_same_file(campaign: Campaign, finished: Path, tmp_path: Path) -> None:
+    """Two Dask workers give what two processes give, byte for byte."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
+    ) as cluster:
+        run_campaign(campaign, tmp_path / "dask", dask=cluster.scheduler_address)
+    other = (tmp_path / "dask" / "results.parquet").read_bytes()
+    assert other == (finished / "results.parquet").read_bytes()
+
+
+def test_cluster_that_is_not_there_is_one_line() -> None:
+    """An address that makes no sense is bad input."""
+    pytest.importorskip("distributed")
+    with pytest.raises(BadInput, match="no scheduler answers"):
+        list(on_dask(abs, [1], "nonsense://127.0.0.1:1"))
+
+
+def test_killed_worker_costs_nothing_but_time(tmp_path: Path) -> None:
+    """Its jobs are done by another, each result comes once."""
+    function: Callable[[int], int] = DiesOnce(tmp_path / "died")
+    assert sorted(in_processes(function, range(8), 2)) == [n * n for n in range(8)]
+    assert (tmp_path / "died").exists()
+
+
+def test_job_that_kills_every_worker_ends_the_campaign() -> None:
+    """Not an endless loop: after five deaths it is said."""
+    with pytest.raises(RigFault, match="its worker died 5 times"):
+        list(in_processes(always_dies, [1], 1))
+
+
+def test_other_folder_is_left_alone(campaign: Campaign, finished: Path, tmp_path: Path) -> None:
+    """Results of another campaign, and anybody's files, are not touched."""
+    path = tmp_path / "other.toml"
+    path.write_text(TEXT.replace("0.05]", "0.06]", 1), encoding="utf-8")
+    with pytest.raises(BadInput, match="another campaign"):
+        ResultStore(finished, load_campaign(path))
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "letter.txt").write_text("dear", encoding="utf-8")
+    with pytest.raises(BadInput, match="neither empty nor a campaign"):
+        ResultStore(tmp_path / "own", campaign)
+
+
+def test_answers_and_page(campaign: Campaign, finished: Path, tmp_path: Path) -> None:
+    """Along each value: one verdict per figure; the page has lines and a map, nothing from afar."""
+    outcomes = outcomes_of(campaign, pq.read_table(finished / "results.parquet"))
+    assert outcomes.labels == ("pid", "asg-ism")
+    assert outcomes.complete.all()
+    assert len(list(documents(outcomes))) == 4
+    stations = outcomes.stations("link.latency_s")
+    assert [(s.value, s.pairs.size) for s in stations] == [(0.01, 4), (0.05, 4)]
+    assert len(sentences(outcomes)) == 4
+    write_page(tmp_path / "page.html", outcomes, "hil sweep delays.toml")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert page.count("<svg") == 6
+    assert "http" not in page.replace("http://www.w3.org", "")
