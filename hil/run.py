@@ -81,9 +81,7 @@ def execute(spec: RunSpec, progress: Progress | None = None, rig: Rig | None = N
 
     `rig` is another one than the spec's target names; it is closed here.
     """
-    cv2.setNumThreads(
-        1
-    )  # search windows are small: handing them to threads costs more than it saves
+    cv2.setNumThreads(1)  # search windows are small: handing them to threads costs more
     parameters = board_parameters(spec.scenario, spec.inner)
     rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
     try:

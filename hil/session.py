@@ -94,6 +94,7 @@ class Session:
         self._progress = progress
         self._t0_s = 0.0
         self._dialect_hash = self._parameter_hash = 0
+        self._may_move = False
         self._report: WheelReport | None = None
         self._measurement: PoseMeasurement | None = None
         self._pose_time_s = self._pose_time_recorded_s = -math.inf
@@ -157,6 +158,7 @@ class Session:
 
     def _arm(self) -> None:
         link = self._parts.link
+        self._may_move = True  # from here on the robot is stopped, whatever the board last said
         link.begin(bringup.arm(link, self._dialect_hash, self._parameter_hash))
         self._pump_while(lambda: link.busy, math.inf)
         # Set-points must follow at once: the board stops by itself after 250 ms of silence.
@@ -192,7 +194,7 @@ class Session:
     def _stop(self) -> None:
         """Stop the wheels: politely while the board answers, by repeated stop commands if not."""
         rig, link = self._parts.rig, self._parts.link
-        if not link.armed:
+        if not self._may_move:
             return
         try:
             self._send_wheels(0.0, 0.0)
