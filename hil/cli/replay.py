@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 @click.command("replay")
 @click.argument("run", type=click.Path(path_type=Path))
 @click.option("--outer", type=LAWS, help="Shadow: what this outer law would have commanded.")
+@click.option("--inner", type=LAWS, help="Shadow: PWM that this wheel law would have set.")
+@click.option("--firmware", is_flag=True,
+              help="Also replay set-points and encoder counts through the firmware core.")  # fmt: skip
 @set_option
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
               help="Folder for replay.json and replayed.parquet; must not exist or be empty.")  # fmt: skip
@@ -23,6 +26,8 @@ if TYPE_CHECKING:
 def command(
     run: Path,
     outer: str | None,
+    inner: str | None,
+    firmware: bool,
     overrides: tuple[str, ...],
     out: Path | None,
     as_json: bool,
@@ -33,10 +38,14 @@ def command(
     status 0), or the first difference of each channel is reported (1). With --outer or --set it is
     a shadow: what that law would have commanded in each recorded state. The robot did not follow
     the shadow, so this is open loop and no verdict on the other law.
+
+    --firmware, --inner or a --set of a board parameter sends the recorded set-points and encoder
+    counts through the firmware core and compares its PWM with the recorded one.
     """
     from hil.cli.progress import run_progress
     from hil.record.manifest import read_manifest
     from hil.replay.exact import replay
+    from hil.replay.firmware import replay_wheels
     from hil.replay.output import claim_folder, write_output
 
     duration_s = float(read_manifest(run).scenario.get("duration_s", 0.0))
@@ -44,12 +53,18 @@ def command(
         claim_folder(out)
     with run_progress({run.name: duration_s}) as update:
         report = replay(run, outer, overrides, lambda t_s: update(run.name, t_s))
+    board_changes = [text for text in overrides if text.startswith("board.")]
+    wheels = (
+        replay_wheels(run, inner, board_changes) if firmware or inner or board_changes else None
+    )
     if out is not None:
         write_output(out, report)
     if as_json:
-        print_json(report.to_json())
+        print_json(report.to_json() | {"firmware": wheels.to_json() if wheels else None})
     else:
         print_report(report)
+        if wheels is not None:
+            click.echo(wheels.text())
     return 0 if report.kind == "shadow" or report.identical else 1
 
 

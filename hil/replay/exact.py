@@ -213,7 +213,7 @@ def _changed(recorded: Scenario, overrides: Sequence[str]) -> Scenario:
         set_value(tree, text)
     changed = build(Scenario, tree, "--set")
     check_board(changed.board)
-    for key in ("duration_s", "start", "mismatch", "board", "disturbances", "faults"):
+    for key in ("duration_s", "start", "mismatch", "disturbances", "faults"):
         if getattr(changed, key) != getattr(recorded, key):
             raise BadInput(f"--set {key}: happened in the record and cannot be changed in a replay")
     if changed.control.rate_hz != recorded.control.rate_hz:

@@ -1,0 +1,55 @@
+"""The recorded wheel loops come out of the firmware core again, as far as reports tell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hil.errors import BadInput
+from hil.replay.firmware import replay_wheels
+from tests.replay.records import cut, record
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four seconds under way."""
+    return record(tmp_path_factory.mktemp("firmware") / "run", ("duration_s=4",)).path
+
+
+@pytest.mark.parametrize("inner", ["asg-ism", "pid"])
+def test_pwm_of_the_recorded_law_comes_out_again(tmp_path: Path, inner: str) -> None:
+    """Within a tenth of its size, although only every fifth tick's counts are known."""
+    path = record(tmp_path / "run", ("duration_s=4",), inner=inner).path
+    report = replay_wheels(path)
+    assert not report.shadow
+    assert report.reports > 180
+    for side in (report.left, report.right):
+        assert side.rms_recorded > 50
+        assert side.rms_difference < 0.1 * side.rms_recorded
+        assert side.correlation > 0.99
+
+
+def test_changed_board_parameter_shows(made: Path) -> None:
+    """Negative control: a feed-forward half as strong is told apart from the recorded one."""
+    same = replay_wheels(made)
+    other = replay_wheels(made, None, ["board.FF_GAIN=0.03"])
+    assert other.shadow
+    assert other.left.rms_difference > 3 * same.left.rms_difference
+
+
+def test_other_wheel_law_is_a_shadow(made: Path) -> None:
+    """It sets another PWM, and says that the wheels did not follow it."""
+    report = replay_wheels(made, "pid")
+    assert report.shadow
+    assert "shadow" in report.text()
+    assert report.phase_us == 0
+    assert report.left.rms_difference > replay_wheels(made).left.rms_difference
+
+
+def test_too_short_a_log_is_refused(tmp_path: Path) -> None:
+    """A link log that ends before the arming has nothing to compare."""
+    path = record(tmp_path / "run", ("duration_s=0.5",)).path
+    cut(path / "link.tlog", 0.3)
+    with pytest.raises(BadInput, match="reports while armed"):
+        replay_wheels(path)
