@@ -116,6 +116,13 @@ class MarksConfig(Section):
         le=1.0,
         description="m over the floor: top of the wheels (2 r = 96 mm) + plate",
     )
+    ground_ratio_max: float = Field(
+        0.85,
+        gt=0.0,
+        le=100.0,
+        description="brightness of the ground about a mark over its own, at most: on a dark plate"
+        " 0.25, in a lamp's reflection 0.7; coloured things on the floor have 1.5 and more",
+    )
     swapped_marks: bool = Field(
         False, description="fault: colours changed over on the robot, the host not told"
     )

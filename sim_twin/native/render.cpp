@@ -103,20 +103,23 @@ void Renderer::edge_table() {
 }
 
 void Renderer::sample_table() {
-    // Additive recurrence in three dimensions (generalised golden ratio): even for any count.
+    // Additive recurrence in three dimensions (generalised golden ratio): even for any count. Each
+    // sample has its mirror image in place and time, so that no pixel's samples lean to one side.
     constexpr double phi = 1.2207440846057596;
     for (int set = 0; set < SETS; ++set) {
         double shift[3];
         for (int d = 0; d < 3; ++d) shift[d] = unit(hash(0x5e7, set, d));
-        for (int i = 0; i < PER_SET; ++i) {
+        for (int i = 0; i < PER_SET / 2; ++i) {
             double p[3], power = 1.0;
             for (double& x : p) {
                 power *= phi;
                 x = std::fmod(shift[&x - p] + i / power, 1.0);
             }
-            samples_.push_back({static_cast<float>(pixel_offset(p[0], scene_.blur)),
-                                static_cast<float>(pixel_offset(p[1], scene_.blur)),
-                                static_cast<int>(p[2] * SLOTS)});
+            const float du = static_cast<float>(pixel_offset(p[0], scene_.blur));
+            const float dv = static_cast<float>(pixel_offset(p[1], scene_.blur));
+            const int slot = static_cast<int>(p[2] * SLOTS);
+            samples_.push_back({du, dv, slot});
+            samples_.push_back({-du, -dv, SLOTS - 1 - slot});
         }
     }
 }

@@ -131,11 +131,13 @@ uint8_t Renderer::trace(const Sight& world, const Pose& pose) const {
     const float x = body.x + body.lx * robot_.top, y = body.y + body.ly * robot_.top;
     if (std::fabs(x) < robot_.half_length && std::fabs(y) < robot_.half_width)
         return trace_top(x, y);
-    // Nothing of the robot reaches farther than this radius at any height up to its top.
-    const float r2 = robot_radius_ * robot_radius_;
-    const float mx = body.x + 0.5f * body.lx * robot_.top, my = body.y + 0.5f * body.ly * robot_.top;
-    const float slack = 0.5f * robot_.top * (std::fabs(body.lx) + std::fabs(body.ly));
-    if (mx * mx + my * my > r2 + slack * (slack + 2.0f * robot_radius_)) return ID_FLOOR;
+    // Nothing but bars reaches farther than these at any height up to the top.
+    const float reach_x = std::max(robot_.half_length, robot_.half_base + robot_.wheel_radius);
+    const float reach_y = std::max(robot_.half_width, robot_.half_track + robot_.wheel_half_width);
+    const float up = 0.5f * robot_.top;
+    if (std::fabs(body.x + body.lx * up) > reach_x + std::fabs(body.lx) * up ||
+        std::fabs(body.y + body.ly * up) > reach_y + std::fabs(body.ly) * up)
+        return ID_FLOOR;
     return trace_sides(body);
 }
 
