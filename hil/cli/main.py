@@ -27,6 +27,7 @@ COMMANDS = {
     "twin": ("hil.cli.twin", "Serve the digital twin to other programs."),
     "firmware": ("hil.cli.firmware", "Generate, build, upload and configure the firmware."),
     "calibrate": ("hil.cli.calibrate", "Calibrate lens, camera pose over the floor, and colours."),
+    "bringup": ("hil.cli.bringup", "Check a rig with its wheels off the ground; measure it."),
     "localise": ("hil.cli.localise", "Find the robot in a video or in images, without a rig."),
     "doctor": ("hil.cli.doctor", "Say what is installed and connected, and what is missing."),
     "bench": ("hil.cli.bench", "Measure the speed of the harness on this machine."),

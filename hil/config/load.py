@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from hil._firmware import parameter_table
+from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
 from hil.errors import BadInput
 
@@ -99,10 +100,20 @@ def read_tree(name_or_path: str, kind: str) -> Tree:
             tree[part] = merge(below, own)
     base = tree.pop("base", None)
     if base is not None:
-        of_scenario = str(base) in builtin_names("scenarios")
-        below = read_tree(_beside(folder, str(base)), "scenarios" if of_scenario else "labs")
-        tree = merge(below, tree)
+        tree = merge(read_tree(_beside(folder, str(base)), _base_kind(str(base), kind)), tree)
     return tree
+
+
+def _base_kind(base: str, kind: str) -> str:
+    """Return the kind of the file below: a scenario lies on another one or on a lab."""
+    if kind != "scenarios":
+        return kind
+    return "scenarios" if base in builtin_names("scenarios") else "labs"
+
+
+def load_robot(name_or_path: str) -> RobotConfig:
+    """Return a robot by its built-in name or file; raises BadInput."""
+    return build(RobotConfig, read_tree(name_or_path, "robots"), name_or_path)
 
 
 def _beside(folder: Path | None, name: str) -> str:

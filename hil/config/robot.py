@@ -6,7 +6,7 @@ Bounds stand here; the numbers and where each one comes from stand in the robot 
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -74,6 +74,20 @@ class FloorConfig(Section):
     )
 
 
+Magnitude = Annotated[float, Field(ge=0, le=1000)]
+Sides = tuple[Magnitude, Magnitude]
+
+
+class BringUpConfig(Section):
+    """What `hil bringup` measured with the wheels off the ground, (left, right) magnitudes."""
+
+    dead_duty_forward: Sides = Field(description="duty at which the wheels start, forward")
+    dead_duty_backward: Sides = Field(description="the same backward")
+    top_speed_forward_rad_s: Sides = Field(description="wheel speed at full duty, forward")
+    top_speed_backward_rad_s: Sides = Field(description="the same backward")
+    battery_v: float = Field(gt=0, le=60, description="battery at full speed")
+
+
 class RobotConfig(Section):
     """A four-wheel skid-steer robot, two driven wheels a side (control.md section 1)."""
 
@@ -100,6 +114,7 @@ class RobotConfig(Section):
     bridge: BridgeConfig
     battery: BatteryConfig
     floor: FloorConfig
+    bring_up: BringUpConfig | None = Field(None, description="measured, for people to compare with")
 
     @model_validator(mode="after")
     def _current_slow_enough(self) -> Self:

@@ -91,6 +91,7 @@ class BoardLink:
         }
         self.clock = BoardClock()
         self.counters = self._reader.counters
+        self.frames_sent = 0
         self.last_frame_s = -math.inf
         self.heartbeats = 0
         self.state = dialect.HIL_STATE_DISARMED
@@ -244,6 +245,7 @@ class BoardLink:
 
     def _write(self, frame: bytes, t_s: float) -> None:
         self._stream.write(frame)
+        self.frames_sent += 1
         if self._tap is not None:
             self._tap("tx", t_s, frame)
 
@@ -276,12 +278,13 @@ class BoardLink:
         if t_s >= self._timesync_due_s:
             first = self.clock.exchanges < _TIMESYNC_FIRST
             self._timesync_due_s = t_s + (_TIMESYNC_FIRST_PERIOD_S if first else _TIMESYNC_PERIOD_S)
-            self._send_timesync(t_s)
+            self.ask_time(t_s)
         self._timer_due_s = min(self._heartbeat_due_s, self._timesync_due_s)
 
-    def _send_timesync(self, t_s: float) -> None:
+    def ask_time(self, t_s: float) -> None:
+        """Ask for the board's time; the answer is one more exchange of `clock`."""
         ts1_ns = round(t_s * 1e9)
-        if len(self._timesync_sent_s) > 8:  # replies that never came
-            self._timesync_sent_s.clear()
+        if len(self._timesync_sent_s) > 31:  # replies that never came
+            del self._timesync_sent_s[next(iter(self._timesync_sent_s))]
         self._timesync_sent_s[ts1_ns] = t_s
         self.send(dialect.MAVLink_timesync_message(0, ts1_ns))

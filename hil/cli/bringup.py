@@ -1,0 +1,163 @@
+"""`hil bringup`: wheels off the ground, everything checked piece by piece, the robot measured."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import suppress
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from hil.cli.options import json_option, print_json
+from hil.errors import BadInput
+
+if TYPE_CHECKING:
+    from hil.bringup.result import Check, Report, Side
+    from hil.bringup.wiring import Seen
+    from hil.config.robot import RobotConfig
+
+_SEEN = "[lf] left forward, [lb] left backward, [rf] right forward, [rb] right backward, [n] none"
+
+
+@click.command("bringup")
+@click.option("--on", "target", required=True, metavar="serial:DEV[@BAUD]",
+              help="Port of the board.")  # fmt: skip
+@click.option("--robot", default="thesis-4wd", show_default=True, metavar="ROBOT",
+              help="The robot as believed: a built-in name or a TOML file.")  # fmt: skip
+@click.option("--out", type=click.Path(path_type=Path), metavar="FILE",
+              help="Write the measured robot file, laid over the believed one.")  # fmt: skip
+@click.option("--turns", type=click.FloatRange(0.0, 100.0), default=10.0, show_default=True,
+              help="Wheel turns for the count of the encoders; 0 leaves it out.")  # fmt: skip
+@click.option("--yes", is_flag=True, help="The wheels are off the ground and nobody looks at "
+              "them: no questions, directions stay unseen.")  # fmt: skip
+@json_option
+def command(
+    target: str, robot: str, out: Path | None, turns: float, yes: bool, as_json: bool
+) -> int:
+    """Check a rig whose wheels are OFF THE GROUND, and measure the robot.
+
+    Link, identity, battery; each side alone, slowly: motor, encoder, left and right; then dead zone
+    and top speed, forward and backward; then counts a turn. Status 1 when a check fails. The wheels
+    stand whenever a question is asked, and at the end.
+    """
+    from hil.bringup.robot_file import check_out, write_robot_file
+    from hil.config.load import load_robot
+    from hil.targets.serial import parse_target
+
+    believed = load_robot(robot)
+    device, baud = parse_target(target)
+    if out is not None:
+        check_out(out, robot)
+    if not yes:
+        _confirm()
+    report = _run(device, baud, believed, 0.0 if yes else turns, yes)
+    if as_json:
+        print_json({"target": target, **report.to_json()})
+    else:
+        click.echo(_summary(report))
+    if out is not None:
+        when = f"{datetime.now().astimezone():%Y-%m-%d %H:%M} on {target}"
+        counts = believed.encoder_counts_per_turn
+        written = write_robot_file(out, robot, counts, report.measured, when)
+        click.echo(f"{'written' if written else 'nothing measured, not written'}: {out}", err=True)
+    return 0 if report.passed else 1
+
+
+def _run(device: str, baud: int, believed: RobotConfig, turns: float, yes: bool) -> Report:
+    from hil.bringup.procedure import BringUp, Plan
+    from hil.config.control import OuterLimits
+    from hil.targets.serial import SerialRig
+
+    limits = OuterLimits()
+    rim_m_s = limits.eta1_max_m_s + limits.theta_dot_max_rad_s * believed.track_m / 2.0
+    plan = Plan(believed, rim_m_s / believed.wheel_radius_m, turns)
+    rig = SerialRig(device, baud, None)
+    try:
+        return BringUp(rig, Nobody() if yes else Person(), plan, _tell).run()
+    finally:
+        rig.close()
+
+
+def _tell(check: Check) -> None:
+    """Print one check, on stderr: stdout is for the result."""
+    marks = {"ok": ("pass", "green"), "fail": ("FAIL", "red"), "note": ("note", "yellow"),
+             "skipped": ("skip", "yellow")}  # fmt: skip
+    word, colour = marks[check.state]
+    click.echo(f"{click.style(word, fg=colour)}  {check.name}: {check.text}", err=True)
+    if check.remedy:
+        click.echo(f"      -> {check.remedy}", err=True)
+
+
+def _summary(report: Report) -> str:
+    if report.passed:
+        return "bring-up: all checks passed"
+    found = ", ".join(f"{name}: {fault}" for name, fault in report.faults)
+    return f"bring-up: {len(report.faults)} failed ({found})"
+
+
+def _ask(question: str) -> str:
+    """Return the answer; raises BadInput where nobody can give one."""
+    click.echo(f"{question} ", nl=False, err=True)
+    with suppress(EOFError):
+        return input().strip().lower()
+    click.echo(err=True)
+    raise BadInput("bringup asks what the wheels do: run it in a terminal, or with --yes")
+
+
+def _confirm() -> None:
+    answer = _ask("The wheels will turn, up to full speed. Are ALL of them off the ground? [y/N]")
+    if answer not in {"y", "yes"}:
+        click.echo("nothing was moved", err=True)
+        sys.exit(2)
+
+
+class Person:
+    """Somebody at the terminal who looks at the wheels."""
+
+    def watch(self, text: str) -> None:
+        """Say what is about to be driven, and wait until they look."""
+        _ask(f"\nNext, {text}. Enter when you look at them:")
+
+    def seen(self, driven: Side) -> Seen | None:
+        """Ask which wheels turned and which way."""
+        from hil.bringup.wiring import Seen
+
+        sides: dict[str, Seen | None] = {
+            "lf": Seen("left"), "lb": Seen("left", forward=False), "rf": Seen("right"),
+            "rb": Seen("right", forward=False), "n": Seen(None), "?": None,
+        }  # fmt: skip
+        while True:
+            answer = _ask(f"{driven} was driven. Which wheels turned? {_SEEN}, [?] not seen:")
+            if answer in sides:
+                return sides[answer]
+
+    def turns(self, side: Side, believed: float) -> float | None:
+        """Ask for the number of turns counted."""
+        while True:
+            answer = _ask(
+                f"How many turns did the {side} wheels make, to a twentieth? "
+                f"(the counts say {believed:.2f}; [?] not counted):"
+            )
+            if answer == "?":
+                return None
+            with suppress(ValueError):
+                if float(answer) > 0.0:
+                    return float(answer)
+
+
+class Nobody:
+    """Nobody looks: directions stay unseen, turns uncounted."""
+
+    def watch(self, text: str) -> None:
+        """Say what is driven."""
+        click.echo(f"      {text}", err=True)
+
+    def seen(self, driven: Side) -> Seen | None:  # noqa: ARG002 - nobody looks at either side
+        """Return None."""
+        return None
+
+    def turns(self, side: Side, believed: float) -> float | None:  # noqa: ARG002
+        """Return None."""
+        return None

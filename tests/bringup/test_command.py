@@ -1,0 +1,82 @@
+"""`hil bringup` over a pseudo-terminal in real time, and its bad usage."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+
+import pytest
+from click.testing import CliRunner
+
+from hil.bringup import measure
+from hil.cli.bringup import command
+from hil.config.events import Fault
+from hil.errors import BadInput, RigFault
+from hil.serve import TwinServer
+from tests.bringup.rigs import SPEEDS, lifted
+
+
+@pytest.fixture
+def served(tmp_path):
+    """Return a function that serves a twin from a thread and gives its port."""
+    stop = threading.Event()
+    threads = []
+
+    def serve(twin) -> str:
+        server = TwinServer(twin, tmp_path / "board", tmp_path / "camera")
+
+        def run():
+            while not stop.is_set():
+                server.run(time.monotonic() + 0.05)
+            server.close()
+
+        threads.append(threading.Thread(target=run))
+        threads[0].start()
+        return f"serial:{tmp_path / 'board'}"
+
+    yield serve
+    stop.set()
+    threads[0].join()
+
+
+def test_planted_faults_are_found_through_a_pseudo_terminal(served, monkeypatch, tmp_path):
+    """Swapped phases left, a dead encoder right, somebody answering: both named, status 1."""
+    monkeypatch.setattr(measure, "_LOOK_S", 2.2)  # real time: up to 45 % duty and a bit
+    monkeypatch.setattr(measure, "_LOOK_HOLD_S", 0.2)
+    twin = lifted(
+        Fault(kind="swapped_phases", side="left"), Fault(kind="dead_encoder", side="right")
+    )
+    out = tmp_path / "robot.toml"
+    arguments = ["--on", served(twin), "--json", "--out", str(out)]
+    answers = "y\n\nlf\n\nrf\n"
+    run = CliRunner().invoke(command, arguments, input=answers, standalone_mode=False)
+    document = json.loads(run.stdout)
+    assert run.return_value == 1
+    assert not document["passed"]
+    failed = [(c["name"], c["fault"]) for c in document["checks"] if c["state"] == "fail"]
+    assert failed == [("left encoder", "swapped_phases"), ("right encoder", "dead_encoder")]
+    assert "FAIL  left encoder" in run.stderr
+    assert not out.exists()
+    assert max(abs(twin._kernel.state()[i]) for i in SPEEDS) < 0.05
+
+
+def test_nobody_to_answer_is_bad_input():
+    """No terminal and no --yes: one line, nothing opened, nothing moved."""
+    run = CliRunner().invoke(command, ["--on", "serial:/dev/none"], input="")
+    assert isinstance(run.exception, BadInput)
+    assert "--yes" in str(run.exception)
+
+
+def test_wheels_on_the_ground_end_it():
+    """Any answer but yes: status 2 before the port is opened."""
+    run = CliRunner().invoke(command, ["--on", "serial:/dev/none"], input="n\n")
+    assert run.exit_code == 2
+    assert "nothing was moved" in run.stderr
+
+
+def test_a_port_that_is_not_there_is_a_rig_fault():
+    """Status 3's error names the port."""
+    run = CliRunner().invoke(command, ["--on", "serial:/dev/none", "--yes"])
+    assert isinstance(run.exception, RigFault)
+    assert "/dev/none" in str(run.exception)
