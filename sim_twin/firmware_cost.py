@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,13 +55,14 @@ class FirmwareCost:
 class _Bench:
     """A board brought up on a plain wire and driven by set-points."""
 
-    def __init__(self, robot: RobotConfig) -> None:
+    def __init__(self, robot: RobotConfig, changes: Mapping[str, float]) -> None:
         link = LinkConfig(latency_s=0.0, latency_jitter_s=0.0)
         self.rig = Pil(TwinSetup(robot, link, CameraConfig(), Pose(0.0, 0.0, 0.0), 1))
         self.link = BoardLink(self.rig.stream)
         self.last: Any = None  # WHEEL_STATE
         parameters = {entry.name: entry.default for entry in _firmware.parameter_table()}
         parameters["ENC_COUNTS"] = float(robot.encoder_counts_per_turn)
+        parameters.update(changes)
         bringup.finish(self.link, self.rig, bringup.connect(self.link, parameters))
         info = self.link.info
         arming = bringup.arm(self.link, info.dialect_hash, info.parameter_hash)
@@ -73,13 +74,20 @@ class _Bench:
         begin_s = self.rig.now_s()
         for step in range(round(seconds / _SETPOINT_S)):
             self.link.send_setpoint(self.rig.now_s(), *speeds(step * _SETPOINT_S))
-            until_s = begin_s + (step + 1) * _SETPOINT_S
-            while self.rig.now_s() < until_s:
-                self.rig.wait(until_s)
-                for report in self.link.poll(self.rig.now_s()):
-                    self.last = report.wire
+            self._listen(begin_s + (step + 1) * _SETPOINT_S)
         after = self.rig.board.usage()
         return 1.0 - (after["asleep"] - before["asleep"]) / (after["cycles"] - before["cycles"])
+
+    def stop(self) -> None:
+        """Disarm and wait until the robot stands."""
+        bringup.finish(self.link, self.rig, bringup.disarm(self.link))
+        self._listen(self.rig.now_s() + 2.0)
+
+    def _listen(self, until_s: float) -> None:
+        while self.rig.now_s() < until_s:
+            self.rig.wait(until_s)
+            for report in self.link.poll(self.rig.now_s()):
+                self.last = report.wire
 
 
 def _weaving(t_s: float) -> tuple[float, float]:
@@ -87,23 +95,27 @@ def _weaving(t_s: float) -> tuple[float, float]:
     return 6.0 * math.sin(3.0 * t_s) + 0.5 * math.sin(17.0 * t_s), 5.0 * math.cos(2.3 * t_s)
 
 
-def measure(robot: RobotConfig, seconds: float = 3.0) -> FirmwareCost:
-    """Drive the processor in the loop and look at what it did; takes a few seconds of wall time."""
-    made = build()
-    bench, parts = _Bench(robot), part_map(made)
+def measure(robot: RobotConfig, parameters: Mapping[str, float] | None = None) -> FirmwareCost:
+    """Drive the processor in the loop and look at what it did; takes a few seconds of wall time.
+
+    `parameters` are board parameters that differ from their defaults.
+    """
+    made, changes = build(), parameters or {}
+    bench, parts = _Bench(robot, changes), part_map(made)
     board = bench.rig.board
-    awake_ratio = bench.drive(seconds, _weaving)
+    awake_ratio = bench.drive(3.0, _weaving)
     board.start_profile(parts.part_of_word)
     bench.drive(1.0, _weaving)
     by_part, interrupts_off, _ = board.profile()
     board.stop_profile()
     share = {name: count / CLOCK_HZ for name, count in zip(parts.names, by_part, strict=True)}
     interrupts = board.usage()["interrupts"]
-    awake_full_ratio, edges_lost = _full_encoders(robot)
+    full, awake_full_ratio = _full_encoders(robot, changes)
+    counted = (full.last.left_counts, full.last.right_counts)
     return FirmwareCost(
         flash_bytes=made.flash_bytes,
         ram_bytes=made.ram_bytes,
-        stack_bytes=board.stack_used,
+        stack_bytes=max(board.stack_used, full.rig.board.stack_used),
         cycles_per_tick={name: part * CLOCK_HZ / TICKS_PER_S for name, part in share.items()},
         tick_and_link_ratio=sum(v for name, v in share.items() if name.startswith(_TICK_AND_LINK)),
         awake_ratio=awake_ratio,
@@ -111,19 +123,17 @@ def measure(robot: RobotConfig, seconds: float = 3.0) -> FirmwareCost:
         longest_tick_us=1e-3 * bench.link.sys_status.load * _firmware.TICK_US,
         encoder_interrupt_cycles=max(interrupts[vector][2] for vector in _ENCODER_VECTORS),
         interrupts_off_cycles=interrupts_off,
-        edges_lost=edges_lost,
+        edges_lost=sum(abs(a - b) for a, b in zip(counted, full.rig.true_counts, strict=True)),
     )
 
 
-def _full_encoders(robot: RobotConfig) -> tuple[float, int]:
-    """Return (share awake, edges lost) with finer encoders: 8,000 edges a second at 10 rad/s."""
+def _full_encoders(robot: RobotConfig, changes: Mapping[str, float]) -> tuple[_Bench, float]:
+    """Run with finer encoders, 8,000 edges a second at 10 rad/s; return bench and share awake."""
     counts_per_turn = round(FULL_EDGES_1_S * math.tau / _FULL_SPEED_RAD_S)
     fine = robot.model_copy(update={"encoder_counts_per_turn": counts_per_turn})
-    bench = _Bench(fine)
+    bench = _Bench(fine, changes)
     straight = (_FULL_SPEED_RAD_S, _FULL_SPEED_RAD_S)
     bench.drive(1.0, lambda _: straight)
     awake_ratio = bench.drive(2.0, lambda _: straight)
-    bench.drive(2.0, lambda _: (0.0, 0.0))
-    counted = (bench.last.left_counts, bench.last.right_counts)
-    lost = sum(abs(a - b) for a, b in zip(counted, bench.rig.true_counts, strict=True))
-    return awake_ratio, lost
+    bench.stop()
+    return bench, awake_ratio

@@ -29,8 +29,5 @@ void send(Port port, uint8_t n);
 // Whether either port has received bytes; cheap enough to ask with interrupts off before sleeping.
 bool has_received();
 
-// Received bytes dropped so far: ring full, or overrun and framing errors of the hardware.
-uint16_t lost();
-
 }  // namespace uart
 }  // namespace hil
