@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 @click.option("--inner", type=LAWS, help="Shadow: PWM that this wheel law would have set.")
 @click.option("--firmware", is_flag=True,
               help="Also replay set-points and encoder counts through the firmware core.")  # fmt: skip
+@click.option("--fit", is_flag=True,
+              help="Also fit a twin to RUN and run the other law on it, in closed loop.")  # fmt: skip
 @set_option
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
               help="Folder for replay.json and replayed.parquet; must not exist or be empty.")  # fmt: skip
@@ -28,6 +30,7 @@ def command(
     outer: str | None,
     inner: str | None,
     firmware: bool,
+    fit: bool,
     overrides: tuple[str, ...],
     out: Path | None,
     as_json: bool,
@@ -40,13 +43,15 @@ def command(
     the shadow, so this is open loop and no verdict on the other law.
 
     --firmware, --inner or a --set of a board parameter sends the recorded set-points and encoder
-    counts through the firmware core and compares its PWM with the recorded one.
+    counts through the firmware core and compares its PWM with the recorded one. --fit answers in
+    closed loop, on a twin whose parameters are fitted to RUN, with the residual of that fit.
     """
     from hil.cli.progress import run_progress
     from hil.record.manifest import read_manifest
     from hil.replay.exact import replay
     from hil.replay.firmware import replay_wheels
     from hil.replay.output import claim_folder, write_output
+    from hil.replay.what_if import what_if
 
     duration_s = float(read_manifest(run).scenario.get("duration_s", 0.0))
     if out is not None:
@@ -57,14 +62,21 @@ def command(
     wheels = (
         replay_wheels(run, inner, board_changes) if firmware or inner or board_changes else None
     )
+    answer = what_if(run, outer, overrides) if fit else None
+    document = report.to_json() | {
+        "firmware": wheels.to_json() if wheels else None,
+        "fitted_twin": answer.to_json() if answer else None,
+    }
     if out is not None:
-        write_output(out, report)
+        write_output(out, report, document)
     if as_json:
-        print_json(report.to_json() | {"firmware": wheels.to_json() if wheels else None})
+        print_json(document)
     else:
         print_report(report)
         if wheels is not None:
             click.echo(wheels.text())
+        if answer is not None:
+            click.echo(answer.text())
     return 0 if report.kind == "shadow" or report.identical else 1
 
 

@@ -49,7 +49,7 @@ _LEFT_OUT = frozenset(
 _BOOT_US = 2_000_000
 
 
-class _Sent(NamedTuple):
+class Sent(NamedTuple):
     """A frame for the board and when it reached it, in unwrapped board time."""
 
     t_us: int
@@ -109,7 +109,7 @@ class FirmwareReport:
 
 
 @dataclass(frozen=True, slots=True)
-class _Trace:
+class Trace:
     """The wheel reports of a record as columns, board time unwrapped."""
 
     t_us: NDArray[np.int64]
@@ -137,13 +137,13 @@ def replay_firmware(
     source: Source, parameters: Mapping[str, float], inner: str, *, shadow: bool
 ) -> FirmwareReport:
     """Run the core on a record's set-points and counts; raises BadInput without enough of them."""
-    trace, arrivals = _read_reports(source)
+    trace, arrivals = read_reports(source)
     if int(trace.armed.sum()) < _LEAST_REPORTS:
         raise BadInput(
             f"{source.path}: {int(trace.armed.sum())} wheel reports while armed in link.tlog, "
             f"{_LEAST_REPORTS} are needed for a firmware replay"
         )
-    sent = _sent_frames(source, arrivals)
+    sent = sent_frames(source, arrivals)
     found = {phase: _run(trace, sent, parameters, phase) for phase in PHASES_US}
     rms = {phase: _rms(pwm[trace.armed] - trace.pwm[trace.armed]) for phase, pwm in found.items()}
     # Without a clear best phase (a shadow, or a wheel at rest) the tick itself is the honest one.
@@ -156,7 +156,7 @@ def replay_firmware(
     )  # fmt: skip
 
 
-def _read_reports(source: Source) -> tuple[_Trace, dict[int, int]]:
+def read_reports(source: Source) -> tuple[Trace, dict[int, int]]:
     """Return the reports, and the board time at which each named set-point arrived."""
     reader = FrameReader()
     states = [
@@ -177,12 +177,12 @@ def _read_reports(source: Source) -> tuple[_Trace, dict[int, int]]:
     ).reshape(-1, 4)
     armed = np.array([s.state == dialect.HIL_STATE_ARMED for s in states], dtype=np.bool_)
     return (
-        _Trace(np.array(t_us, np.int64), columns[:, :2], columns[:, 2:].astype(float), armed),
+        Trace(np.array(t_us, np.int64), columns[:, :2], columns[:, 2:].astype(float), armed),
         arrivals,
     )
 
 
-def _sent_frames(source: Source, arrivals: Mapping[int, int]) -> list[_Sent]:
+def sent_frames(source: Source, arrivals: Mapping[int, int]) -> list[Sent]:
     """Return the host's frames in the order and at the times at which the board had them."""
     timed: list[tuple[int, int | None, bytes]] = []
     delays = []
@@ -194,27 +194,28 @@ def _sent_frames(source: Source, arrivals: Mapping[int, int]) -> list[_Sent]:
             continue
         arrival = None
         if msg_id == dialect.MAVLINK_MSG_ID_WHEEL_SETPOINT:
-            arrival = arrivals.get(_decoded(logged.frame).seq)
+            arrival = arrivals.get(decoded(logged.frame).seq)
             if arrival is not None:
                 delays.append(arrival - logged.unix_us)
         timed.append((logged.unix_us, arrival, logged.frame))
     if not delays:
         raise BadInput(f"{source.path}: no wheel report names a set-point of link.tlog")
     usual = round(float(np.median(delays)))
-    found: list[_Sent] = []
+    found: list[Sent] = []
     for unix_us, arrival, frame in timed:
         at = arrival if arrival is not None else unix_us + usual
         # Frames do not overtake each other on a wire.
-        found.append(_Sent(max(at, found[-1].t_us) if found else at, frame))
+        found.append(Sent(max(at, found[-1].t_us) if found else at, frame))
     return found
 
 
-def _decoded(frame: bytes) -> Any:
+def decoded(frame: bytes) -> Any:
+    """Return the message of a whole frame."""
     return dialect.MAVLink(None).decode(bytearray(frame))
 
 
 def _run(
-    trace: _Trace, sent: Sequence[_Sent], parameters: Mapping[str, float], phase_us: int
+    trace: Trace, sent: Sequence[Sent], parameters: Mapping[str, float], phase_us: int
 ) -> Array:
     """Return the core's PWM (n, 2) at the tick of every report."""
     board, writer = Board(), FrameWriter()
@@ -255,7 +256,7 @@ def _own_arming(frame: bytes, board: Board, writer: FrameWriter) -> bytes:
     """Return the frame; an arming with the hashes of this board in place of the recorded one's."""
     if int.from_bytes(frame[7:10], "little") != dialect.MAVLINK_MSG_ID_COMMAND_LONG:
         return frame
-    command = _decoded(frame)
+    command = decoded(frame)
     arms = command.command == dialect.MAV_CMD_COMPONENT_ARM_DISARM and command.param1 == 1.0
     if not arms:
         return frame

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hil.errors import BadInput
 from hil.record.journal import write_parquet
@@ -28,8 +28,8 @@ def claim_folder(folder: Path) -> None:
         raise BadInput(f"--out {folder}: cannot be made: {error.strerror}") from None
 
 
-def write_output(folder: Path, report: ReplayReport) -> None:
-    """Write replay.json and replayed.parquet (columns as in samples.parquet)."""
-    text = json.dumps(report.to_json(), indent=1, ensure_ascii=False)
+def write_output(folder: Path, report: ReplayReport, document: dict[str, Any]) -> None:
+    """Write `document` as replay.json, and replayed.parquet (columns as in samples.parquet)."""
+    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     write_parquet(folder / "replayed.parquet", report.samples, SAMPLE_COLUMNS)
     replace_file(folder / "replay.json", text.encode() + b"\n")

@@ -1,0 +1,69 @@
+"""A fitted twin finds what the record's robot was made of, and says how far it can be trusted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hil.config.load import build
+from hil.config.scenario import Scenario
+from hil.errors import BadInput
+from hil.replay.exact import read_source
+from hil.replay.fit import Fit, Rehearsal, fit_twin
+from hil.replay.what_if import what_if
+from tests.replay.records import record
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a run to the point, of a robot some 10 % off what the host believes."""
+    return record(tmp_path_factory.mktemp("fit") / "run", ("duration_s=7",)).path
+
+
+@pytest.fixture(scope="module")
+def fit(made: Path) -> Fit:
+    """Fit it."""
+    source = read_source(made)
+    return fit_twin(Rehearsal(source, build(Scenario, source.manifest.scenario, "record")))
+
+
+def test_parameters_of_the_recorded_robot_are_found(fit: Fit) -> None:
+    """The scenarios' robot has wheels 10 % larger, a track 10 % narrower and 10 % more friction.
+
+    Torque and speed constants are 10 % lower and the winding's resistance, which is not fitted,
+    10 % higher; k/R is what a record can tell: 0.9/1.1 = 0.82.
+    """
+    found = {name: value for name, (value, _, _) in fit.ratios.items()}
+    assert found["wheel radius"] == pytest.approx(1.10, abs=0.03)
+    assert found["track"] == pytest.approx(0.90, abs=0.05)
+    assert found["motor constants"] == pytest.approx(0.82, abs=0.06)
+    assert found["motor friction"] == pytest.approx(1.10, abs=0.2)
+    assert -0.03 < fit.camera_tie_s < 0.06
+
+
+def test_fit_holds_on_parts_it_has_not_seen(fit: Fit) -> None:
+    """On windows held out the fitted twin is several times closer than the unfitted one."""
+    assert fit.windows_held_out >= 3
+    for name in ("wheel speed", "pwm", "forward", "turn"):
+        assert fit.residual_held_out[name] < 0.5 * fit.residual_unfitted[name], name
+
+
+def test_answer_carries_its_checks(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The recorded law on the fitted twin does about what it did in the record."""
+    monkeypatch.setattr("hil.replay.what_if.SEEDS", 3)
+    answer = what_if(made, "pid")
+    ise = answer.answers["ise_m2_s"]
+    assert ise.baseline_mean == pytest.approx(answer.in_record["ise_m2_s"], rel=0.1)
+    assert ise.pairs == 3
+    assert "held out" in answer.text()
+    assert answer.to_json()["fit"]["residual_rms"]["forward"]["held_out_parts"] > 0
+
+
+def test_record_of_a_robot_at_rest_is_refused(tmp_path: Path) -> None:
+    """Nothing can be fitted where nothing moves."""
+    start = ("duration_s=1", "start.x_m=-0.03", "start.y_m=0", "start.theta_rad=0")
+    path = record(tmp_path / "run", (*start, "control.limits.hold_enter_m=0.9",
+                                     "control.limits.hold_leave_m=1")).path  # fmt: skip
+    with pytest.raises(BadInput, match="moves"):
+        what_if(path, "pid")
