@@ -26,6 +26,8 @@ Figures = Mapping[str, float]
 Evaluate = Callable[[str, Gains, "Case", int], Figures]
 # (outer law, candidates done, candidates in all, best cost so far)
 Progress = Callable[[str, int, int, float], None]
+# name -> (least, start, largest) of what is searched, on a logarithmic scale
+Box = Mapping[str, tuple[float, float, float]]
 
 # A run's cost is the sum of weight * figure: the error, weighted by time so that a rest error
 # counts, and the variation of the commands (chatter), at about a tenth of the whole in a calm run.
@@ -123,11 +125,11 @@ def candidate_cost(outer: str, gains: Gains, evaluate: Evaluate, plan: Plan) -> 
     return sum(costs) / len(costs)
 
 
-def decode(outer: str, point: Sequence[float]) -> dict[str, float]:
+def decode(box: Box, point: Sequence[float]) -> dict[str, float]:
     """Return the gains at a point of the unit cube, to four digits (as the file will hold them)."""
     return {
         name: float(f"{low * (high / low) ** min(max(u, 0.0), 1.0):.4g}")
-        for (name, (low, _, high)), u in zip(SEARCH[outer].items(), point, strict=True)
+        for (name, (low, _, high)), u in zip(box.items(), point, strict=True)
     }
 
 
@@ -139,39 +141,59 @@ def with_values(base: Gains, outer: str, values: Mapping[str, float]) -> Gains:
     return Gains.model_validate(tree)
 
 
+def minimise(
+    box: Box,
+    cost: Callable[[dict[str, float]], float],
+    *,
+    candidates: int,
+    population: int,
+    seed: int,
+    progress: Callable[[int, float], None] | None = None,
+) -> Found:
+    """Return the values of least cost among the candidates; deterministic by its seed.
+
+    `progress` is told the candidates done and the best cost so far.
+    """
+    import cma  # noqa: PLC0415 - slow import, needed by this function alone
+
+    start = [math.log(middle / low) / math.log(high / low) for low, middle, high in box.values()]
+    options = {"bounds": [0.0, 1.0], "popsize": population, "seed": seed, "verbose": -9}
+    strategy = cma.CMAEvolutionStrategy(start, 0.15, options)
+    values = decode(box, start)
+    start_cost = cost(values)
+    best = (start_cost, values)
+    done = 1
+    while done + population <= candidates:
+        points = strategy.ask()
+        costs = []
+        for point in points:
+            values = decode(box, point)
+            costs.append(cost(values))
+            best = min(best, (costs[-1], values), key=lambda item: item[0])
+            done += 1
+            if progress is not None:
+                progress(done, best[0])
+        strategy.tell(points, costs)
+    return Found(best[1], best[0], start_cost, done)
+
+
 def search(
     outer: str, base: Gains, evaluate: Evaluate, plan: Plan, progress: Progress | None = None
 ) -> Found:
     """Return the best gains of `outer` within the plan's budget; deterministic by its seeds."""
-    import cma  # noqa: PLC0415 - slow import, needed by this function alone
 
-    start = [
-        math.log(middle / low) / math.log(high / low)
-        for low, middle, high in SEARCH[outer].values()
-    ]
-    options = {
-        "bounds": [0.0, 1.0],
-        "popsize": plan.population,
-        "seed": plan.search_seed,
-        "verbose": -9,
-    }
-    strategy = cma.CMAEvolutionStrategy(start, 0.15, options)
-    values = decode(outer, start)
-    start_cost = candidate_cost(outer, with_values(base, outer, values), evaluate, plan)
-    best = (start_cost, values)
-    done = 1
-    while done + plan.population <= plan.candidates:
-        points = strategy.ask()
-        costs = []
-        for point in points:
-            values = decode(outer, point)
-            costs.append(candidate_cost(outer, with_values(base, outer, values), evaluate, plan))
-            best = min(best, (costs[-1], values), key=lambda item: item[0])
-            done += 1
-            if progress is not None:
-                progress(outer, done, plan.candidates, best[0])
-        strategy.tell(points, costs)
-    return Found(best[1], best[0], start_cost, done)
+    def told(done: int, best: float) -> None:
+        if progress is not None:
+            progress(outer, done, plan.candidates, best)
+
+    return minimise(
+        SEARCH[outer],
+        lambda values: candidate_cost(outer, with_values(base, outer, values), evaluate, plan),
+        candidates=plan.candidates,
+        population=plan.population,
+        seed=plan.search_seed,
+        progress=told,
+    )
 
 
 def tune(

@@ -102,7 +102,7 @@ def test_search_bounds_are_valid_gains(outer):
     """Both corners of the search box pass the bounds of the configuration."""
     size = len(SEARCH[outer])
     for corner in (0.0, 1.0):
-        with_values(BASE, outer, decode(outer, [corner] * size))
+        with_values(BASE, outer, decode(SEARCH[outer], [corner] * size))
 
 
 def test_cases_are_scenarios_calm_and_pushed():
