@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from hil.errors import BadInput
 from hil.metrics import BY_NAME, METRICS, Figures, Metric, Verdict, check
+from hil.report.tiers import tier_gap
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -119,6 +120,8 @@ def _warnings(entries: Sequence[Entry]) -> list[str]:
             if here != there:
                 name = key.replace("_", " ")
                 lines.append(f"{entry.label}: {name} {there} against {here} ({entries[0].label})")
+        gap = tier_gap(entries[0].run, entry.run)
+        lines += [f"{entry.label}: {gap}"] if gap else []
         for key, here, there in differences(first.scenario, other.scenario):
             text = f"{key} {_short(there)} against {_short(here)} ({entries[0].label})"
             lines.append(f"{entry.label}: {text}")
