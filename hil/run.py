@@ -131,7 +131,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink) -> Parts:
     geometry = BelievedGeometry(
         robot.wheel_radius_m, robot.track_m, robot.d0_m, robot.encoder_counts_per_turn
     )
-    timeline = Timeline(recorder)
+    timeline = Timeline(recorder, _unix_us)
     return Parts(
         rig=rig,
         link=BoardLink(rig.stream, timeline.link_frame),
@@ -149,7 +149,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink) -> Parts:
 def make_manifest(spec: RunSpec) -> Manifest:
     """Return the manifest a record opens with."""
     gains = spec.scenario.control.active_gains.model_dump(mode="json")
-    now_us = time.time_ns() // 1000
+    now_us = _unix_us()
     return Manifest(
         command=spec.command,
         scenario=spec.scenario.model_dump(mode="json"),
@@ -170,10 +170,15 @@ def make_manifest(spec: RunSpec) -> Manifest:
     )
 
 
+def _unix_us() -> int:
+    return time.time_ns() // 1000
+
+
 def link_stats(link: BoardLink) -> LinkStats:
     """Return the counters of the host's end of the link."""
     counters = link.counters
     return LinkStats(
+        frames_sent=link.frames_sent,
         frames_received=counters.frames,
         frames_lost=counters.lost,
         bytes_rejected=counters.skipped_bytes,

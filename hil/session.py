@@ -95,6 +95,7 @@ class Session:
         self._t0_s = 0.0
         self._dialect_hash = self._parameter_hash = 0
         self._may_move = False
+        self._texts_noted = 0
         self._report: WheelReport | None = None
         self._measurement: PoseMeasurement | None = None
         self._pose_time_s = self._pose_time_recorded_s = -math.inf
@@ -247,9 +248,15 @@ class Session:
                 self._uplink_s += _UPLINK_GAIN * (0.5 * report.round_trip_s - self._uplink_s)
         while (frame := parts.rig.poll_frame()) is not None:
             self._take_frame(frame, now_s)
-        for text in parts.link.texts:
-            if text.t_host_s == now_s:
-                self._note("board", text.text)
+        if parts.link.texts_heard != self._texts_noted:
+            self._note_texts()
+
+    def _note_texts(self) -> None:
+        link = self._parts.link
+        new = link.texts_heard - self._texts_noted
+        self._texts_noted = link.texts_heard
+        for text in list(link.texts)[-new:]:
+            self._note("board", text.text)
 
     def _take_frame(self, frame: Frame, now_s: float) -> None:
         """Localise one frame and hand the pose to the estimator at its exposure time."""

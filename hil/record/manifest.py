@@ -59,7 +59,7 @@ class Manifest(BaseModel):
     firmware_build_id: str = ""
     start_time_utc: str = ""
     start_unix_us: int = Field(
-        0, description="wall time of opening; stands for t_s = 0 in link.tlog"
+        0, description="wall time of t_s = 0, in link.tlog too; until control begins, of opening"
     )
     tick_count: int = 0
     link: dict[str, float] = Field(default_factory=dict, description="counters of the host link")

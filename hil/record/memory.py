@@ -27,6 +27,9 @@ class RunSink(Protocol):
     def link_frame(self) -> Callable[[float, bytes], None]:
         """Take one MAVLink frame with its time."""
 
+    def start(self, unix_us: int) -> None:
+        """Take the wall time of t_s = 0, before anything that is dated by it."""
+
     def append(self, row: Sequence[float]) -> None:
         """Take one outer tick in the order of schema.SAMPLE_NAMES."""
 
@@ -50,6 +53,9 @@ class MemoryRecorder:
     frames: list[Sequence[float]] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     link_frames: list[tuple[float, bytes]] = field(default_factory=list)
+
+    def start(self, unix_us: int) -> None:
+        """Leave the manifest's wall time: a replay's is that of its record."""
 
     def append(self, row: Sequence[float]) -> None:
         """Take one outer tick in the order of schema.SAMPLE_NAMES."""

@@ -72,6 +72,12 @@ class Recorder:
         except OSError as error:
             raise BadInput(f"--out {out_dir}: cannot be made: {error.strerror}") from None
 
+    def start(self, unix_us: int) -> None:
+        """Take the wall time of t_s = 0, which dates every frame of link.tlog."""
+        self._tlog.start_unix_us = unix_us
+        self._manifest = self._manifest.model_copy(update={"start_unix_us": unix_us})
+        write_manifest(self.path, self._manifest)
+
     def append(self, row: Sequence[float]) -> None:
         """Append one outer tick, values in the order of schema.SAMPLE_NAMES, NaN for unknown."""
         self._write_row(row)

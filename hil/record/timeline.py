@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from hil.rows import frame_row
 
@@ -17,11 +17,12 @@ class Timeline:
     """Writes frames, events and link traffic to a recorder with t = 0 at the start of control.
 
     What happens before that instant is known is held back (a few seconds of connecting) and then
-    written with its negative times.
+    written with its negative times. `unix_us` tells the wall time: it is asked at the start, once.
     """
 
-    def __init__(self, recorder: RunSink) -> None:
+    def __init__(self, recorder: RunSink, unix_us: Callable[[], int]) -> None:
         self._recorder = recorder
+        self._unix_us = unix_us
         self._origin_s: float | None = None
         self._held: list[tuple[float, Callable[[float], None]]] = []
 
@@ -30,6 +31,7 @@ class Timeline:
         if self._origin_s is not None:
             return
         self._origin_s = t_host_s
+        self._recorder.start(self._unix_us())
         for t_s, write in self._held:
             write(t_s - t_host_s)
         self._held.clear()
@@ -40,8 +42,8 @@ class Timeline:
         else:
             write(t_host_s - self._origin_s)
 
-    def link_frame(self, way: Literal["rx", "tx"], t_host_s: float, data: bytes) -> None:
-        """Record one MAVLink frame."""
+    def link_frame(self, t_host_s: float, data: bytes) -> None:
+        """Record one MAVLink frame of either way: it names its sender itself."""
         if self._origin_s is not None:  # the short way: this runs for every frame
             self._recorder.link_frame(t_host_s - self._origin_s, data)
         else:

@@ -32,11 +32,11 @@ class TlogWriter:
 
     def __init__(self, path: Path, start_unix_us: int) -> None:
         self._file = path.open("wb")
-        self._start_unix_us = start_unix_us
+        self.start_unix_us = start_unix_us
 
     def write(self, t_s: float, frame: bytes) -> None:
         """Append one frame sent or received at `t_s` after the start."""
-        stamp = self._start_unix_us + round(t_s * 1e6)
+        stamp = self.start_unix_us + round(t_s * 1e6)
         self._file.write(_STAMP.pack(stamp) + frame)
 
     def flush(self) -> None:

@@ -10,7 +10,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from hil.clocks import BoardClock
 from hil.errors import RigFault
@@ -19,7 +19,7 @@ from hil.types import WheelSample
 from hil.wire import dialect
 from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM, FrameReader, FrameWriter
 
-Tap = Callable[[Literal["rx", "tx"], float, bytes], None]
+Tap = Callable[[float, bytes], None]
 Procedure = Generator[None, None, None]
 
 _TIMESYNC_PERIOD_S = 0.5
@@ -61,7 +61,7 @@ def enum_name(enum: str, value: int) -> str:
 class BoardLink:
     """Speaks to one board over a byte stream.
 
-    `tap` is given every good frame of both directions with its host time. Faults of the rig and
+    `tap` is given the host time and the bytes of every good frame of both directions. Faults of the rig and
     refusals of the board are raised as RigFault by `poll`.
     """
 
@@ -102,6 +102,7 @@ class BoardLink:
         self.parameter_count = 0
         self.parameter_names: dict[int, str] = {}
         self.texts: deque[StatusText] = deque(maxlen=100)
+        self.texts_heard = 0  # in all; `texts` keeps the last of them
 
     # -- what a caller asks ------------------------------------------------------------------
 
@@ -186,7 +187,7 @@ class BoardLink:
         reports = []
         for msg_id, message, frame in self._reader.feed(data):
             if self._tap is not None:
-                self._tap("rx", t_s, frame)
+                self._tap(t_s, frame)
             if msg_id == dialect.MAVLINK_MSG_ID_WHEEL_STATE:
                 reports.append(self._on_wheel_state(message))
             else:
@@ -229,6 +230,7 @@ class BoardLink:
 
     def _on_statustext(self, message: Any) -> None:
         self.texts.append(StatusText(self.t_s, message.severity, message.text))
+        self.texts_heard += 1
 
     def _on_param_value(self, message: Any) -> None:
         self.parameters[message.param_id] = message.param_value
@@ -247,7 +249,7 @@ class BoardLink:
         self._stream.write(frame)
         self.frames_sent += 1
         if self._tap is not None:
-            self._tap("tx", t_s, frame)
+            self._tap(t_s, frame)
 
     def send(self, message: dialect.MAVLink_message) -> None:
         """Send any message of the dialect at the time of the last poll."""

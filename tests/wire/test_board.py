@@ -10,6 +10,7 @@ import pytest
 from hil import _firmware
 from hil.errors import RigFault
 from hil.wire import bringup, dialect, identity
+from hil.wire.framing import BOARD_SYSTEM, HOST_SYSTEM
 from hil.wire.link import BoardLink
 from tests.wire.board_rig import TICK_S, BoardRig
 
@@ -264,11 +265,14 @@ def test_a_third_of_the_line_is_to_spare():
     assert 500 < (rig.bytes_down - down) / 5.0 < 3_840
 
 
+WAYS = {BOARD_SYSTEM: "rx", HOST_SYSTEM: "tx"}  # a frame names its sender in its sixth byte
+
+
 def test_every_frame_of_both_ways_reaches_the_tap():
     """The tap's frames decode with the dialect, in order, and count as many as were exchanged."""
     tapped = []
     rig = BoardRig()
-    link = BoardLink(rig.stream, lambda way, t_s, frame: tapped.append((way, t_s, frame)))
+    link = BoardLink(rig.stream, lambda t_s, frame: tapped.append((WAYS[frame[5]], t_s, frame)))
     bringup.finish(link, rig, bringup.connect(link, DEFAULTS))
     drive(link, rig, 0.5)
     decoder = dialect.MAVLink(None)
