@@ -11,7 +11,7 @@ from hil import _firmware
 from hil.config.camera import CameraConfig
 from hil.config.link import LinkConfig
 from hil.config.robot import RobotConfig
-from hil.firmware import build
+from hil.firmware import FLASH_LIMIT_BYTES, RAM_LIMIT_BYTES, build
 from hil.types import Pose
 from hil.wire import bringup
 from hil.wire.link import BoardLink
@@ -137,3 +137,19 @@ def _full_encoders(robot: RobotConfig, changes: Mapping[str, float]) -> tuple[_B
     awake_ratio = bench.drive(2.0, lambda _: straight)
     bench.stop()
     return bench, awake_ratio
+
+
+def budgets(cost: FirmwareCost) -> list[tuple[str, float, str, str]]:
+    """Return (what, measured, unit, limit) for every figure that has one, and some that have none."""
+    return [
+        ("tick and link traffic", 100 * cost.tick_and_link_ratio, "%", "<= 40"),
+        ("awake in all", 100 * cost.awake_ratio, "%", ""),
+        ("awake at 8,000 edges/s a wheel", 100 * cost.awake_full_ratio, "%", ""),
+        ("edges lost at that speed", cost.edges_lost, "", "0"),
+        ("encoder interrupt", cost.encoder_interrupt_cycles, "cycles", "<= 100"),
+        ("longest stretch with interrupts off", cost.interrupts_off_cycles, "cycles", ""),
+        ("longest tick", cost.longest_tick_us, "us", "<= 4000"),
+        ("flash", cost.flash_bytes, "bytes", f"<= {FLASH_LIMIT_BYTES}"),
+        ("static RAM", cost.ram_bytes, "bytes", f"<= {RAM_LIMIT_BYTES}"),
+        ("deepest stack", cost.stack_bytes, "bytes", "<= 1024"),
+    ]

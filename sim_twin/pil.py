@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.errors import BadInput
-from hil.firmware import Build, build
+from hil.firmware import Build, build, find_toolchain
 from sim_twin.twin import FrameMaker, Twin, TwinSetup
 
 if TYPE_CHECKING:
@@ -30,6 +30,16 @@ def pil_module() -> type[_pil.Board]:
             "then set the project up again with .ci/setup"
         ) from None
     return Board
+
+
+def pil_is_missing() -> str:
+    """Return what keeps target `pil` from running here and how to get it, "" when nothing does."""
+    try:
+        find_toolchain()
+        pil_module()
+    except BadInput as error:
+        return str(error)
+    return ""
 
 
 class Pil(Twin):

@@ -9,12 +9,10 @@ import pytest
 from hil.config.camera import CameraConfig
 from hil.config.events import Fault
 from hil.config.link import LinkConfig
-from hil.errors import BadInput
-from hil.firmware import find_toolchain
 from hil.targets.base import ByteStream
 from hil.types import Pose
 from hil.wire.link import BoardLink, WheelReport
-from sim_twin.pil import Pil, pil_module
+from sim_twin.pil import Pil, pil_is_missing
 from sim_twin.twin import HOST_START_S, TwinSetup
 from tests.twin.rigs import Drive, robot
 
@@ -24,17 +22,7 @@ WIRE = LinkConfig(latency_s=0.0, latency_jitter_s=0.0)
 BOOT_S = 0.1
 
 
-def _missing() -> str:
-    """Return what keeps the processor from being simulated here, with how to get it."""
-    try:
-        find_toolchain()
-        pil_module()
-    except BadInput as error:
-        return str(error)
-    return ""
-
-
-needs_toolchain = pytest.mark.skipif(bool(_missing()), reason=_missing())
+needs_toolchain = pytest.mark.skipif(bool(pil_is_missing()), reason=pil_is_missing())
 
 
 class Tap:
