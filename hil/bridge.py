@@ -80,10 +80,10 @@ class UdpBridge:
         if self._start_s is None:
             self._start_s = t_host_s
         if t_host_s >= self._heartbeat_due_s:
-            self._heartbeat_due_s = t_host_s + _HEARTBEAT_PERIOD_S
+            self._heartbeat_due_s = _next(self._heartbeat_due_s, _HEARTBEAT_PERIOD_S, t_host_s)
             self._send(_heartbeat(armed))
         if t_host_s >= self._pose_due_s:
-            self._pose_due_s = t_host_s + _POSE_PERIOD_S
+            self._pose_due_s = _next(self._pose_due_s, _POSE_PERIOD_S, t_host_s)
             state = ned_from_world(estimate)
             boot_ms = round((t_host_s - self._start_s) * 1e3) & 0xFFFF_FFFF
             self._send(
@@ -112,8 +112,14 @@ class UdpBridge:
             return  # nobody listens, or the network is down: the run matters more
 
     def close(self) -> None:
-        """Release the socket; safe to call twice."""
+        """Say that the robot is disarmed and release the socket; safe to call twice."""
+        self._send(_heartbeat(armed=False))
         self._socket.close()
+
+
+def _next(due_s: float, period_s: float, now_s: float) -> float:
+    """Return the next date of a schedule that keeps its rate whenever it is looked at."""
+    return due_s + period_s if now_s < due_s + period_s else now_s + period_s
 
 
 def _heartbeat(armed: bool) -> common.MAVLink_message:

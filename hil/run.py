@@ -20,7 +20,7 @@ from hil.record.recorder import Recorder
 from hil.record.tape import TapedRig
 from hil.record.timeline import Timeline
 from hil.references import make_reference
-from hil.session import Parts, Progress, Session
+from hil.session import Parts, Progress, Publish, Session
 from hil.targets import SIMULATED, open_rig
 from hil.wire.identity import board_hashes
 from hil.wire.link import BoardLink
@@ -62,6 +62,8 @@ def exit_status(record: RunRecord) -> int:
 
 def camera_for(scenario: Scenario, target: str, asked: str | None) -> str:
     """Return the camera asked for, or the target's default one."""
+    if target.startswith("replay:"):
+        return "as recorded"
     return asked or (scenario.camera_source if target in SIMULATED else "0")
 
 
@@ -76,10 +78,16 @@ def new_folder(stem: str) -> Path:
     return folder
 
 
-def execute(spec: RunSpec, progress: Progress | None = None, rig: Rig | None = None) -> RunRecord:
+def execute(
+    spec: RunSpec,
+    progress: Progress | None = None,
+    rig: Rig | None = None,
+    publish: Publish | None = None,
+) -> RunRecord:
     """Run the spec and return its closed record; raises BadInput before anything is written.
 
-    `rig` is another one than the spec's target names; it is closed here.
+    `rig` is another one than the spec's target names; it is closed here. `publish` is given the
+    estimate of every tick.
     """
     cv2.setNumThreads(1)  # search windows are small: handing them to threads costs more
     parameters = board_parameters(spec.scenario, spec.inner)
@@ -93,7 +101,7 @@ def execute(spec: RunSpec, progress: Progress | None = None, rig: Rig | None = N
             rerun=spec.rerun,
         )
         parts = make_parts(spec, TapedRig(rig, recorder.tape), recorder)
-        session = Session(spec.scenario, parts, parameters, board_hashes, progress)
+        session = Session(spec.scenario, parts, parameters, board_hashes, progress, publish)
         ending = session.run()
         return recorder.close(ending.outcome, ending.detail, link_stats(parts.link))
     finally:

@@ -41,6 +41,8 @@ _LATE_RATIO = 0.5
 _UPLINK_GAIN = 0.05
 
 Progress = Callable[[float], None]
+# Takes host time, state of the robot, and whether it is armed, once a tick.
+Publish = Callable[[float, "Estimate", bool], None]
 
 
 class Localiser(Protocol):
@@ -86,12 +88,14 @@ class Session:
         parameters: dict[str, float],
         hashes: Callable[[dict[str, float]], tuple[int, int]],
         progress: Progress | None = None,
+        publish: Publish | None = None,
     ) -> None:
         self._scenario = scenario
         self._parts = parts
         self._parameters = parameters
         self._hashes = hashes
         self._progress = progress
+        self._publish = publish
         self._t0_s = 0.0
         self._dialect_hash = self._parameter_hash = 0
         self._may_move = False
@@ -189,6 +193,8 @@ class Session:
             command = law.step(reference, estimate, period_s)
             wheels = self._command_wheels(now_s, command)
             self._record(now_s, command, wheels, now_s - due_s > _LATE_RATIO * period_s)
+            if self._publish is not None:
+                self._publish(now_s, estimate, self._parts.link.armed)
             if self._progress is not None:
                 self._progress(now_s - self._t0_s)
 

@@ -15,11 +15,12 @@ LAWS = click.Choice(["pid", "asg-ism"])
 
 target_option = click.option(
     "--on", "target", default="twin", show_default=True, metavar="TARGET",
-    help="twin, pil, or serial:DEV[@BAUD].",
+    help="twin, pil, serial:DEV[@BAUD], or replay:RUN (open loop: a record answers).",
 )  # fmt: skip
 camera_option = click.option(
     "--camera", metavar="SOURCE",
-    help="rendered, pose (no pictures, drawn measurement errors), a camera INDEX or a video FILE. "
+    help="rendered, pose (no pictures, drawn measurement errors), a camera INDEX, a video FILE, or "
+    "twin:SOCKET (the camera of `hil twin serve`). "
     "[default: as the scenario says on a simulated target, 0 on a real one]",
 )  # fmt: skip
 outer_option = click.option("--outer", type=LAWS, default="asg-ism", show_default=True,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +25,7 @@ from hil.cli.progress import run_progress
 
 if TYPE_CHECKING:
     from hil.record.reader import RunRecord
+    from hil.session import Publish
 
 
 @click.command("run")
@@ -35,6 +38,10 @@ if TYPE_CHECKING:
 @set_option
 @out_option
 @click.option("--record-camera", is_flag=True, help="Keep every frame in camera.mkv.")
+@click.option(
+    "--bridge", is_flag=False, flag_value="127.0.0.1:14550", metavar="[HOST:PORT]",
+    help="Show the robot to ground stations over UDP.  [without a value: 127.0.0.1:14550]",
+)  # fmt: skip
 @click.option("--view", is_flag=True, help="Open the record in the viewer afterwards.")
 @json_option
 def command(
@@ -47,6 +54,7 @@ def command(
     overrides: tuple[str, ...],
     out: Path | None,
     record_camera: bool,
+    bridge: str | None,
     view: bool,
     as_json: bool,
 ) -> int:
@@ -70,8 +78,11 @@ def command(
         record_camera=record_camera,
         command=command_line(),
     )
-    with run_progress({resolved.name: resolved.duration_s}) as update:
-        record = execute(spec, lambda t_s: update(resolved.name, t_s))
+    with (
+        run_progress({resolved.name: resolved.duration_s}) as update,
+        _ground_stations(bridge) as publish,
+    ):
+        record = execute(spec, lambda t_s: update(resolved.name, t_s), publish=publish)
     if as_json:
         print_json(summary(record))
     else:
@@ -81,6 +92,21 @@ def command(
 
         click.echo(open_viewer([record.path]), err=True)
     return exit_status(record)
+
+
+@contextmanager
+def _ground_stations(address: str | None) -> Iterator[Publish | None]:
+    """Give what publishes to ground stations, None when nobody asked for it."""
+    if address is None:
+        yield None
+        return
+    from hil.bridge import UdpBridge
+
+    bridge = UdpBridge(address)
+    try:
+        yield bridge.publish
+    finally:
+        bridge.close()
 
 
 def summary(record: RunRecord) -> dict[str, Any]:

@@ -3,9 +3,11 @@
 import math
 
 import pytest
+from click.testing import CliRunner
 from pymavlink import mavutil
 
 from hil.bridge import UdpBridge, ned_from_world, parse_address
+from hil.cli.run import command
 from hil.errors import BadInput
 from hil.types import Estimate, Pose
 
@@ -74,3 +76,37 @@ def test_a_bad_address_is_refused(text):
     """An address without host or with a port outside 1 to 65535 is one clear line."""
     with pytest.raises(BadInput, match="HOST:PORT"):
         parse_address(text)
+
+
+def test_a_run_is_seen_by_a_ground_station(tmp_path):
+    """A run with the bridge: armed while it is controlled, moving, and disarmed at the end."""
+    client = mavutil.mavlink_connection("udpin:127.0.0.1:0", dialect="common")
+    port = client.port.getsockname()[1]
+    arguments = [
+        "scenario-1", "--camera", "pose", "--set", "duration_s=2", "--out", str(tmp_path / "run"),
+        "--bridge", f"127.0.0.1:{port}",
+    ]  # fmt: skip
+    try:
+        run = CliRunner().invoke(command, arguments)
+        assert "complete" in run.stdout
+        seen = list(iter(lambda: client.recv_match(blocking=True, timeout=0.2), None))
+    finally:
+        client.close()
+    beats = [m for m in seen if m.get_type() == "HEARTBEAT"]
+    armed = [bool(m.base_mode & mavutil.mavlink.MAV_MODE_FLAG_SAFETY_ARMED) for m in beats]
+    # 1 Hz in 2 s of the robot's time, and the last word.
+    assert armed in ([True, True, True, False], [True, True, False])
+    places = [(m.x, m.y) for m in seen if m.get_type() == "LOCAL_POSITION_NED"]
+    # 10 Hz; scenario 1 starts at X = -0.6 m (east), Y = -0.35 m (north).
+    assert len(places) == pytest.approx(20, abs=2)
+    assert places[0] == pytest.approx((-0.35, -0.60), abs=0.02)
+    assert math.dist(places[0], places[-1]) > 0.05
+
+
+def test_a_bad_bridge_address_leaves_no_record(tmp_path):
+    """The address is looked at before the rig and the folder."""
+    run = CliRunner().invoke(
+        command, ["scenario-1", "--bridge", "nowhere", "--out", str(tmp_path / "run")]
+    )
+    assert isinstance(run.exception, BadInput)
+    assert not (tmp_path / "run").exists()
