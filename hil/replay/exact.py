@@ -128,6 +128,8 @@ def read_source(path: Path) -> Source:
     if manifest.outcome == "running":
         problems.append("cut off in mid-run: the record was never closed")
     tape = read_tape(path / layout.TAPE)
+    if not tape.entries:
+        raise BadInput(f"{path}: {layout.TAPE} is empty: nothing to replay (an imported log?)")
     if tape.problem:
         problems.append(tape.problem)
     tables = []
@@ -143,6 +145,17 @@ def read_source(path: Path) -> Source:
     samples, frames = tables
     link = tuple(read_tlog(path / layout.LINK)) if (path / layout.LINK).is_file() else ()
     return Source(path, manifest, tape, samples, frames, link, tuple(problems))
+
+
+def open_replay(source: Source, recorded: Scenario) -> ReplayRig:
+    """Return the rig that a record makes; `recorded` is its scenario."""
+    video = source.path / layout.CAMERA
+    images: Iterator[Any] = recorded_images(video) if source.has_video else iter(())
+    return ReplayRig(
+        source.tape,
+        recorded_frames(source.frames, images),
+        recorded_truths(source.samples, true_robot(recorded).d0_m),
+    )
 
 
 def replay(
@@ -165,12 +178,7 @@ def replay(
         source.manifest.seed, path,
     )  # fmt: skip
     recorder = MemoryRecorder(source.manifest, keep_link=True)
-    images: Iterator[Any] = recorded_images(path / layout.CAMERA) if source.has_video else iter(())
-    rig = ReplayRig(
-        source.tape,
-        recorded_frames(source.frames, images),
-        recorded_truths(source.samples, true_robot(recorded).d0_m),
-    )
+    rig = open_replay(source, recorded)
     parts = make_parts(spec, rig, recorder)
     shadow = Shadow(parts.law, source.samples) if kind == "shadow" else None
     parts = replace(parts, law=shadow or parts.law)

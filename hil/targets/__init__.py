@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import reduce
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hil.config.load import build
@@ -33,7 +34,13 @@ def open_rig(target: str, scenario: Scenario, camera: str, seed: int) -> Rig:
 
         device, baud = parse_target(target)
         return SerialRig(device, baud, open_source(camera, scenario.camera))
-    raise BadInput(f"target {target!r}: unknown; choose twin, pil or serial:DEV[@BAUD]")
+    if target.startswith("replay:"):
+        from hil.config.scenario import Scenario as Recorded  # noqa: PLC0415
+        from hil.replay.exact import open_replay, read_source  # noqa: PLC0415
+
+        source = read_source(Path(target.removeprefix("replay:")))
+        return open_replay(source, build(Recorded, source.manifest.scenario, str(source.path)))
+    raise BadInput(f"target {target!r}: unknown; choose twin, pil, serial:DEV[@BAUD] or replay:RUN")
 
 
 def true_robot(scenario: Scenario) -> RobotConfig:

@@ -193,3 +193,14 @@ def test_folder_without_a_tape_is_refused(own: Path, tmp_path: Path) -> None:
         replay(own)
     with pytest.raises(BadInput, match="not a run record"):
         replay(tmp_path)
+
+
+def test_record_is_a_target_like_any_other(shared: Path, tmp_path: Path) -> None:
+    """`--on replay:RUN`: the session runs on the record, and its own record has the same rows."""
+    again = record(tmp_path / "again", target=f"replay:{shared}", camera="as recorded")
+    assert again.manifest.outcome == "complete"
+    first, second = (read_parquet(path / "samples.parquet") for path in (shared, again.path))
+    for name, column in first.items():
+        assert np.array_equal(column, second[name], equal_nan=True), name
+    # And that record can be replayed in its turn.
+    assert replay(again.path).identical

@@ -1,0 +1,29 @@
+"""`hil import`: logs of other programs as run records."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from hil.cli.options import json_option, out_option, print_json
+from hil.cli.run import print_summary, summary
+
+
+@click.command("import")
+@click.argument("log", type=click.Path(path_type=Path))
+@click.option("--map", "mapping", type=click.Path(path_type=Path), metavar="FILE.toml",
+              help="What the log is of, and where each column comes from (docs/run-record.md).")  # fmt: skip
+@out_option
+@json_option
+def command(log: Path, mapping: Path | None, out: Path | None, as_json: bool) -> None:
+    """Make a run record of LOG, a MAVLink .tlog or a CSV file, that compare and view accept."""
+    from hil.foreign import import_log
+    from hil.record.manifest import command_line
+    from hil.run import new_folder
+
+    record = import_log(log, mapping, out or new_folder(log.stem), command_line())
+    if as_json:
+        print_json(summary(record))
+    else:
+        print_summary(record)
