@@ -208,7 +208,8 @@ def test_ctrl_c_stops_the_wheels():
     link = BoardLink(twin.stream)
     bringup.finish(link, twin, bringup.connect(link, {}))
     assert link.state_name == "SAFE (STOP_COMMAND)"
-    assert link.parameters["FF_GAIN"] == pytest.approx(0.057)
+    defaults = {entry.name: entry.default for entry in _firmware.parameter_table()}
+    assert link.parameters["FF_GAIN"] == pytest.approx(defaults["FF_GAIN"])
 
 
 def test_a_link_cut_in_mid_drive_ends_with_standing_wheels():
