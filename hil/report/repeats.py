@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hil.metrics import BY_NAME, METRICS, Metric
+from hil.report.compare import differences
 from hil.stats import Adjusted, Paired, adjusted, paired
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ def repeats_of(runs: Sequence[RunRecord]) -> Repeats | None:
     names = arm_names(list(arms))
     paired_runs = {arm: {seed: by_seed[seed] for seed in common} for arm, by_seed in arms.items()}
     figures = {
-        arm: {seed: run.figures().values for seed, run in by_seed.items()}
+        arm: {seed: _figures(run) for seed, run in by_seed.items()}
         for arm, by_seed in paired_runs.items()
     }
     by_figure: dict[str, Values] = {
@@ -183,6 +184,13 @@ def _battery_v(run: RunRecord) -> float:
     return round(float(known.mean()), 2) if known.size else math.nan
 
 
+def _figures(run: RunRecord) -> dict[str, float]:
+    """Return a run's figures; none of a run that ended early, which would look quick and calm."""
+    if run.manifest.outcome != "complete":
+        return dict.fromkeys(BY_NAME, math.nan)
+    return run.figures().values
+
+
 def _holds(run: RunRecord) -> bool:
     complete = run.manifest.outcome == "complete"
     return complete and all(verdict.holds for verdict in run.verdicts())
@@ -198,10 +206,28 @@ def _warnings(
             lines.append(f"{names[arm]}: {len(alone)} runs without a partner of the same seed")
         ended = sum(run.manifest.outcome != "complete" for run in by_seed.values())
         if ended:
-            lines.append(f"{names[arm]}: {ended} runs ended early; their figures cover a part")
+            lines.append(f"{names[arm]}: {ended} runs ended early; their pairs are left out")
+    lines += _unlike([run for by_seed in arms.values() for run in by_seed.values()])
     if len(common) < 10:
         lines.append(f"{len(common)} pairs: an interval from so few is rough")
     return lines
+
+
+def _unlike(runs: Sequence[RunRecord]) -> list[str]:
+    """Return a line for each condition in which the runs differ, and each flaw of a record."""
+    lines = [f"{run.path.name}: {problem}" for run in runs for problem in run.problems]
+    for key in ("target", "camera", "git_revision", "firmware_build_id"):
+        found = sorted({str(getattr(run.manifest, key)) for run in runs})
+        if len(found) > 1:
+            lines.append(f"the runs differ in {key.replace('_', ' ')}: {', '.join(found)}")
+    first = runs[0].manifest.scenario
+    keys = {
+        key
+        for run in runs[1:]
+        if run.manifest.scenario != first
+        for key, _, _ in differences(first, run.manifest.scenario)
+    }
+    return lines + [f"the runs differ in {key}" for key in sorted(keys)]
 
 
 def verdict(metric: Metric, result: Paired, name: str) -> str:

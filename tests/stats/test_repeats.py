@@ -83,6 +83,33 @@ def test_same_law_under_two_names_shows_nothing(four_arms: list[RunRecord]) -> N
         assert not result.certain
 
 
+def test_runs_that_ended_early_do_not_count(four_arms: list[RunRecord]) -> None:
+    """A run that was stopped has a small error integral: its pair is left out, and it is said."""
+    early = [
+        dataclasses.replace(r, manifest=r.manifest.model_copy(update={"outcome": "fault"}))
+        if r.manifest.seed == 2 and r.manifest.outer == "pid"
+        else r
+        for r in four_arms
+    ]
+    found = repeats_of(early)
+    assert found is not None
+    result = found.contrasts[1].results["ise_m2_s"]
+    assert (result.pairs, result.left_out) == (2, 1)
+    assert any("1 runs ended early" in line for line in found.warnings)
+
+
+def test_unlike_conditions_are_named(four_arms: list[RunRecord]) -> None:
+    """Runs of another revision or with another limit among the repeats are pointed out."""
+    other = four_arms[5].manifest
+    tree = {**other.scenario, "safety": {**other.scenario["safety"], "pose_lost_s": 0.3}}
+    changed = other.model_copy(update={"git_revision": "abc", "scenario": tree})
+    mixed = [*four_arms[:5], dataclasses.replace(four_arms[5], manifest=changed), *four_arms[6:]]
+    found = repeats_of(mixed)
+    assert found is not None
+    assert "the runs differ in safety.pose_lost_s" in found.warnings
+    assert any("git revision" in line for line in found.warnings)
+
+
 def test_report_shows_the_intervals(four_arms: list[RunRecord]) -> None:
     """The HTML has a table and a figure per scenario with repeats, and JSON is finite or null."""
     found = study(four_arms)
