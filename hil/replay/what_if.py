@@ -90,13 +90,18 @@ class WhatIf:
         return "\n".join(lines)
 
 
-def what_if(path: Path, outer: str | None, overrides: Sequence[str] = ()) -> WhatIf:
-    """Fit a twin to a record and run the recorded and the other law on it; raises BadInput."""
+def what_if(
+    path: Path, outer: str | None, overrides: Sequence[str] = (), fit: Fit | None = None
+) -> WhatIf:
+    """Fit a twin to a record and run the recorded and the other law on it; raises BadInput.
+
+    `fit` is one made of this record before.
+    """
     source = read_source(path)
     manifest = source.manifest
     recorded = build(Scenario, manifest.scenario, str(path / layout.MANIFEST))
     rehearsal = Rehearsal(source, recorded)
-    fit = fit_twin(rehearsal)
+    fit = fit or fit_twin(rehearsal)
     x_m, y_m, theta_rad = rehearsal.start_pose()
     fitted = recorded.model_copy(
         update={

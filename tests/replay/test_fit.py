@@ -49,10 +49,10 @@ def test_fit_holds_on_parts_it_has_not_seen(fit: Fit) -> None:
         assert fit.residual_held_out[name] < 0.5 * fit.residual_unfitted[name], name
 
 
-def test_answer_carries_its_checks(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_answer_carries_its_checks(made: Path, fit: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
     """The recorded law on the fitted twin does about what it did in the record."""
     monkeypatch.setattr("hil.replay.what_if.SEEDS", 3)
-    answer = what_if(made, "pid")
+    answer = what_if(made, "pid", fit=fit)
     ise = answer.answers["ise_m2_s"]
     assert ise.baseline_mean == pytest.approx(answer.in_record["ise_m2_s"], rel=0.1)
     assert ise.pairs == 3
