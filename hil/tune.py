@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from hil.config.control import Gains
 from hil.config.events import Disturbance
@@ -29,11 +29,17 @@ Progress = Callable[[str, int, int, float], None]
 # name -> (least, start, largest) of what is searched, on a logarithmic scale
 Box = Mapping[str, tuple[float, float, float]]
 
-# A run's cost is the sum of weight * figure: the error, weighted by time so that a rest error
-# counts, and the variation of the commands (chatter), at about a tenth of the whole in a calm run.
-COST_WEIGHTS = {"itae_m_s2": 1.0, "eta1_variation_m_s": 0.5, "theta_dot_variation_rad_s": 0.05}
-# Cost of a run that gives no figure: a safety stop, or a law that diverged.
-COST_FAILED = 100.0
+# A run's cost is the sum of weight * figure: error and time to come within 20 mm, and the variation of
+# the commands (chatter) at about a tenth of the whole in a calm run. ITAE would do worse here: by its
+# weight of time it ranks candidates by where within the millimetres of the control stop they rest.
+COST_WEIGHTS = {
+    "iae_m_s": 1.0,
+    "settling_20mm_s": 0.1,
+    "eta1_variation_m_s": 0.2,
+    "theta_dot_variation_rad_s": 0.02,
+}
+# Cost of a run that gives no figure: a safety stop, a law that diverged, never within 20 mm.
+COST_FAILED = 20.0
 
 # Per law, the gains searched with their bounds, and the start: poles at -1, -2, -3 for both laws
 # (inside its layer the sliding stage has the pole -alpha/eps).
@@ -44,8 +50,8 @@ SEARCH: dict[str, dict[str, tuple[float, float, float]]] = {
         "alpha_m_s3": (0.01, 1.0, 30.0),
         "eps0_m_s2": (1e-3, 0.5, 5.0),
         "eps_min_m_s2": (0.01, 0.5, 5.0),
-        "mu0_s": (0.1, 1.0, 30.0),
-        "sigma_m_s2": (1e-5, 0.01, 1.0),
+        "mu0_s": (0.2, 1.0, 30.0),
+        "sigma_m_s2": (1e-3, 0.01, 1.0),
     },
     "pid": {
         "kp_s3": (0.3, 6.0, 200.0),
@@ -66,27 +72,33 @@ PUSHES = (
 )
 
 
+# A late case: what a bad radio and a loaded host make of link and camera, so that gains keep a margin.
+LATE_LINK = {"latency_s": 0.05, "latency_jitter_s": 0.03}
+LATE_CAMERA = {"latency_s": 0.1, "latency_jitter_s": 0.03, "drop_ratio": 0.1}
+
+Variant = Literal["calm", "pushed", "late"]
+
+
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One run that every candidate makes: a scenario, calm or pushed, over a wheel law."""
+    """One run that every candidate makes: a scenario under a variant of it, over a wheel law."""
 
     scenario: str
+    variant: Variant
     inner: str
-    pushed: bool = False
 
     def __str__(self) -> str:
-        return f"{self.scenario}/{self.inner}{'/pushed' if self.pushed else ''}"
+        return f"{self.scenario} {self.variant} over {self.inner}"
 
 
-CASES = tuple(
-    Case(scenario, inner, pushed)
-    for scenario, pushed in (
-        ("scenario-1", False),
-        ("scenario-3", False),
-        ("scenario-2", True),
-        ("scenario-3", True),
-    )
-    for inner in ("asg-ism", "pid")
+# Each scenario and each variant twice, over either wheel law.
+CASES = (
+    Case("scenario-1", "calm", "asg-ism"),
+    Case("scenario-1", "late", "pid"),
+    Case("scenario-2", "pushed", "pid"),
+    Case("scenario-2", "late", "asg-ism"),
+    Case("scenario-3", "pushed", "asg-ism"),
+    Case("scenario-3", "calm", "pid"),
 )
 
 
@@ -243,8 +255,13 @@ def case_scenario(case: Case, gains: Gains) -> Scenario:
     scenario = load_scenario(case.scenario)
     sets = scenario.control.gains.model_copy(update={"tuned": gains})
     control = scenario.control.model_copy(update={"gains": sets, "gain_set": "tuned"})
-    pushes = PUSHES if case.pushed else scenario.disturbances
-    return scenario.model_copy(update={"control": control, "disturbances": pushes})
+    changed: dict[str, object] = {"control": control}
+    if case.variant == "pushed":
+        changed["disturbances"] = PUSHES
+    elif case.variant == "late":
+        changed["link"] = scenario.link.model_copy(update=LATE_LINK)
+        changed["camera"] = scenario.camera.model_copy(update=LATE_CAMERA)
+    return scenario.model_copy(update=changed)
 
 
 def evaluate_on(target: str, camera: str) -> Evaluate:

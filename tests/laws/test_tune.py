@@ -7,6 +7,7 @@ from collections import Counter
 import pytest
 
 from hil.config.control import ControlConfig, Gains
+from hil.config.load import load_scenario
 from hil.tune import (
     CASES,
     COST_FAILED,
@@ -23,7 +24,7 @@ from hil.tune import (
 )
 
 BASE = ControlConfig().active_gains
-A, B = Case("a", "pid"), Case("b", "pid")
+A, B = Case("a", "calm", "pid"), Case("b", "calm", "pid")
 PLAN = Plan(cases=(A, B), seeds=(1, 2), candidates=121, population=10)
 # Where the made-up cost below has its least value.
 BEST = {"k1_s": 0.5, "sigma_m_s2": 0.1, "kp_s3": 40.0, "kd2_s": 20.0}
@@ -37,7 +38,8 @@ def distance(outer, gains):
 def bowl(outer, gains, case, seed):
     """Figures of a run whose error grows with the distance of the gains from BEST."""
     return {
-        "itae_m_s2": 1.0 + distance(outer, gains) + (case == B) + 0.1 * seed,
+        "iae_m_s": 1.0 + distance(outer, gains) + (case == B) + 0.1 * seed,
+        "settling_20mm_s": 0.0,
         "eta1_variation_m_s": 0.0,
         "theta_dot_variation_rad_s": 0.0,
     }
@@ -82,11 +84,16 @@ def test_the_search_is_repeatable():
 
 def test_a_run_without_figures_costs_most():
     """A missing, NaN or huge figure is the failure cost, no more and no less."""
-    calm = {"itae_m_s2": 2.0, "eta1_variation_m_s": 0.4, "theta_dot_variation_rad_s": 6.0}
-    assert run_cost(calm) == pytest.approx(2.0 + 0.5 * 0.4 + 0.05 * 6.0)
+    calm = {
+        "iae_m_s": 1.5,
+        "settling_20mm_s": 4.0,
+        "eta1_variation_m_s": 0.6,
+        "theta_dot_variation_rad_s": 7.0,
+    }
+    assert run_cost(calm) == pytest.approx(1.5 + 0.1 * 4.0 + 0.2 * 0.6 + 0.02 * 7.0)
     assert run_cost({}) == COST_FAILED
-    assert run_cost({**calm, "itae_m_s2": math.nan}) == COST_FAILED
-    assert run_cost({**calm, "itae_m_s2": 1e6}) == COST_FAILED
+    assert run_cost({**calm, "settling_20mm_s": math.nan}) == COST_FAILED
+    assert run_cost({**calm, "iae_m_s": 1e6}) == COST_FAILED
 
 
 def test_written_gains_are_the_ones_evaluated(tuned, tmp_path):
@@ -105,10 +112,14 @@ def test_search_bounds_are_valid_gains(outer):
         with_values(BASE, outer, decode(SEARCH[outer], [corner] * size))
 
 
-def test_cases_are_scenarios_calm_and_pushed():
-    """Each case loads; a pushed one differs by the disturbances only, and takes the gains."""
+def test_cases_are_scenarios_calm_pushed_and_late():
+    """Each case loads and takes the gains; a variant changes what its name says and nothing else."""
     gains = with_values(BASE, "pid", {"kp_s3": 12.5})
     for case in CASES:
-        scenario = case_scenario(case, gains)
+        scenario, plain = case_scenario(case, gains), load_scenario(case.scenario)
         assert scenario.control.active_gains.pid.kp_s3 == 12.5
-        assert scenario.disturbances == (PUSHES if case.pushed else ())
+        assert scenario.disturbances == (PUSHES if case.variant == "pushed" else ())
+        assert (scenario.link.latency_s > plain.link.latency_s) == (case.variant == "late")
+        assert (scenario.camera.drop_ratio > plain.camera.drop_ratio) == (case.variant == "late")
+    assert Counter(case.variant for case in CASES) == {"calm": 2, "pushed": 2, "late": 2}
+    assert Counter(case.inner for case in CASES) == {"asg-ism": 3, "pid": 3}
