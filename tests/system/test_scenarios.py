@@ -15,7 +15,7 @@ DECK = load_deck("thesis")
 INNER = ("asg-ism", "pid")
 
 
-@pytest.mark.parametrize(("name", "outer", "inner"), product(DECK.scenarios, DECK.laws, INNER))
+@pytest.mark.parametrize(("name", "outer", "inner"), [*product(DECK.scenarios, DECK.laws, INNER)])
 def test_requirements_hold_with_every_law(
     tmp_path: Path, name: str, outer: str, inner: str
 ) -> None:
@@ -26,7 +26,7 @@ def test_requirements_hold_with_every_law(
     assert failed == []
 
 
-@pytest.mark.parametrize(("name", "outer"), product(DECK.scenarios, DECK.laws))
+@pytest.mark.parametrize(("name", "outer"), [*product(DECK.scenarios, DECK.laws)])
 def test_signals_are_finite_and_within_limits(tmp_path: Path, name: str, outer: str) -> None:
     """Commands are finite and never beyond the restrictions that both laws share."""
     scenario = scenario_with(name, ["duration_s=6"])
