@@ -69,7 +69,7 @@ def _contrast(contrast: Contrast) -> dict[str, Any]:
 
 def forest_figure(repeats: Repeats, name: str) -> str:
     """Draw the headline figures' differences with their intervals, one panel per contrast."""
-    contrasts = repeats.contrasts[:3]
+    contrasts = repeats.contrasts[-3:]  # of a 2 x 2 matrix the factors and their interaction
     sheet = draw.Sheet(len(contrasts), 0.8 + 0.26 * len(HEADLINES))
     sheet.figure.subplots_adjust(left=0.24, wspace=0.12)
     for panel, contrast in enumerate(contrasts):
@@ -81,7 +81,8 @@ def forest_figure(repeats: Repeats, name: str) -> str:
         labels = [BY_NAME[key].label for key in HEADLINES] if panel == 0 else []
         axes.set_yticks(range(len(HEADLINES)), labels or [""] * len(HEADLINES))
         axes.set_xlabel("difference in % of the baseline", labelpad=2)
-        axes.set_title(contrast.name if len(contrast.name) < 34 else "", fontsize=8.5, loc="left")
+        title = contrast.name.split(",")[0].split(": outer difference")[0]
+        axes.set_title(title, fontsize=8.5, loc="left")
     return sheet.svg(name)
 
 
