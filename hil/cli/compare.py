@@ -17,8 +17,18 @@ if TYPE_CHECKING:
 @click.argument("runs", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RUN...")
 @click.option("--report", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.html",
               help="Write an HTML report that opens without a network.")  # fmt: skip
+@click.option("--csv", "csv_file", type=click.Path(path_type=Path, dir_okay=False),
+              metavar="FILE.csv", help="Write every run's figures as CSV.")  # fmt: skip
+@click.option("--rerun", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.rrd",
+              help="Write all runs as one recording for the viewer, on a common timeline.")  # fmt: skip
 @json_option
-def command(runs: tuple[Path, ...], report: Path | None, as_json: bool) -> None:
+def command(
+    runs: tuple[Path, ...],
+    report: Path | None,
+    csv_file: Path | None,
+    rerun: Path | None,
+    as_json: bool,
+) -> None:
     """Compare two or more run records of one scenario.
 
     Runs of two or more seeds per law, the same ones for each, are also compared as repeats: paired
@@ -27,12 +37,20 @@ def command(runs: tuple[Path, ...], report: Path | None, as_json: bool) -> None:
     from hil.experiment import study
     from hil.record.manifest import command_line
     from hil.record.reader import read_run
+    from hil.report.csv_table import write_csv
     from hil.report.html import write_report
 
-    found = study([read_run(run) for run in runs])
+    records = [read_run(run) for run in runs]
+    found = study(records)
     if report is not None:
         repeats = [found.repeats] if found.repeats else []
         write_report(report, [found.comparison], command=command_line(), repeats=repeats)
+    if csv_file is not None:
+        write_csv(csv_file, records)
+    if rerun is not None:
+        from hil.record.rrd import write_rrd
+
+        write_rrd(rerun, records)
     if as_json:
         print_json(found.to_json())
         return

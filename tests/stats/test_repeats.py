@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 import json
 import os
@@ -14,6 +15,7 @@ from hil.config.deck import Deck
 from hil.errors import BadInput
 from hil.experiment import Conditions, claim, deck_specs, study
 from hil.record.reader import RunRecord
+from hil.report.csv_table import write_csv
 from hil.report.html import render
 from hil.report.repeats import repeats_of
 from hil.run import execute, execute_in_memory
@@ -119,6 +121,16 @@ def test_report_shows_the_intervals(four_arms: list[RunRecord]) -> None:
     assert "95 % interval" in page
     json.dumps(found.to_json(), allow_nan=False)
     assert {entry.run.manifest.seed for entry in found.comparison.entries} == {1}
+
+
+def test_figures_as_csv(four_arms: list[RunRecord], tmp_path: Path) -> None:
+    """One row a run, numbers as they are; a figure that does not exist is an empty cell."""
+    write_csv(tmp_path / "runs.csv", four_arms)
+    with (tmp_path / "runs.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 12
+    assert float(rows[0]["ise_m2_s"]) == four_arms[0].figures().values["ise_m2_s"]
+    assert (rows[0]["outer"], rows[0]["reaching_s"]) == ("pid", "")
 
 
 def test_interrupted_experiment_goes_on(tmp_path: Path) -> None:

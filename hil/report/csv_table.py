@@ -1,0 +1,36 @@
+"""The figures of runs as CSV, one row a run, for tools that read nothing else."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hil.errors import BadInput
+from hil.metrics import METRICS
+from hil.record.manifest import replace_file
+
+if TYPE_CHECKING:
+    from hil.record.reader import RunRecord
+
+_ABOUT = ("scenario_name", "target", "camera", "outer", "inner", "seed", "outcome")
+
+
+def write_csv(path: Path, runs: Sequence[RunRecord]) -> None:
+    """Write who each run was and its figures in their own units; a missing figure is empty."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["record", *_ABOUT, "basis", *(metric.name for metric in METRICS)])
+    for run in runs:
+        figures = run.figures()
+        values = [figures.values[metric.name] for metric in METRICS]
+        about = [getattr(run.manifest, name) for name in _ABOUT]
+        numbers = [repr(value) if math.isfinite(value) else "" for value in values]
+        writer.writerow([run.path, *about, figures.basis, *numbers])
+    try:
+        replace_file(path, out.getvalue().encode())
+    except OSError as error:
+        raise BadInput(f"--csv {path}: cannot be written: {error.strerror}") from None
