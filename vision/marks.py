@@ -225,7 +225,11 @@ class MarkLocaliser:
         front, rear = (at(disc.u_px, disc.v_px, self._height_m) for disc in discs)
         gap_m = math.dist(front, rear) - self._distance_m
         if not abs(gap_m) <= DISTANCE_TOLERANCE * self._distance_m:
-            return None, f"marks {(self._distance_m + gap_m) * 1e3:.0f} mm apart"
+            own_mm = 1e3 * self._distance_m
+            return (
+                None,
+                f"marks {own_mm + 1e3 * gap_m:.0f} mm apart, the robot's are {own_mm:.0f} mm",
+            )
         return _Found(discs, (front, rear), gap_m), ""
 
     def _refusal(self, disc: Disc) -> str:

@@ -29,11 +29,12 @@ Marks = tuple["Disc", "Disc"]
 RAYS = 48
 # Rays over which an edge's two levels are averaged: a sixth of the rim follows a shadow's edge.
 LEVEL_RAYS = 7
-# Half length of a profile, share of the disc's radius: near (tracking) and wide (first find).
-NEAR, WIDE = 0.35, 0.7
-NEAR_MIN_PX = 2.2
-STEPS_NEAR_MAX = 3
-STEPS_WIDE = 2
+# How far from the rim an edge is looked for, and how far beyond that its two levels are taken, in
+# radii. The longer, the more noise gets in; motion blur at 0.5 m/s over 20 ms is 0.17 each way.
+Reach = tuple[float, float]
+WIDE, NEAR, FINE = (0.55, 0.15), (0.35, 0.15), (0.18, 0.3)
+REACH_MIN_PX = 1.6
+STEPS_MAX = 2
 SETTLED_PX = 0.2  # a step ends within a few % of its length of the answer
 CELL_PX = 8.0
 # A ray counts when its step is this share of the disc's typical one, and its edge within the profile.
@@ -45,8 +46,10 @@ EDGE_SIGMA_MIN_PX = 0.05
 # Doubt of the radius before the fit, relative, as a pull towards the known one.
 RADIUS_SIGMA = 0.02
 RADIUS_PULL = (0.15 / RADIUS_SIGMA) ** 2
-# Neighbouring rays share pixels, so their errors are not independent.
+# Neighbouring rays share pixels, so their errors are not independent; noise that is large against
+# the mark moves levels as well as edges. Both fitted to errors seen on rendered sequences.
 CORRELATION = 1.6
+ROUGHNESS = 8.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,14 +78,19 @@ class _Shape:
 
     `maps` is (2 axes, RAYS, samples) px from the image of the centre; `rows`, (RAYS, 3), how far an
     edge moves along its profile per px in u, per px in v and per unit of growth; `room_px` what the
-    profiles need about the centre.
+    profiles need about the centre; `level_samples` how many samples at each end of a profile give
+    its levels.
     """
 
     radius_px: float
     reach_px: float
     room_px: float
+    level_samples: int
     maps: NDArray[np.float32]
     rows: Array
+
+
+Shapes = tuple[_Shape, _Shape]
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,8 +125,8 @@ class RimFitter:
         self._after, self._before = (ray + 1) % RAYS, (ray - 1) % RAYS
         apart = np.abs((ray[:, None] - ray + RAYS // 2) % RAYS - RAYS // 2)
         self._smooth = ((apart <= LEVEL_RAYS // 2) / LEVEL_RAYS).astype(np.float32)
-        self._shapes: dict[tuple[int, int, float], _Shape | None] = {}
-        self._samples = {share: self._samples_of(share) for share in (NEAR, WIDE)}
+        self._shapes: dict[tuple[int, int, Reach], _Shape | None] = {}
+        self._layouts = {reach: self._layout_of(reach) for reach in (WIDE, NEAR, FINE)}
 
     def fit(self, image: Image, centres_m: Sequence[Point], *, wide: bool) -> Marks | None:
         """Return both discs, front first, from guesses of their centres (x, y), m on their plane.
@@ -127,44 +135,50 @@ class RimFitter:
         disc is out of view or has no edge.
         """
         centres_px = [self._model.project_point(x, y, self._height_m) for x, y in centres_m]
-        if wide:
-            rough = self._settled(image, centres_px, WIDE, STEPS_WIDE)
-            if rough is None:
+        found = None
+        for reach in (WIDE, NEAR, FINE) if wide else (NEAR, FINE):
+            found = self._settled(image, centres_px, reach)
+            if found is None:
                 return None
-            centres_px = rough[0]
-        fitted = self._settled(image, centres_px, NEAR, STEPS_NEAR_MAX)
-        return None if fitted is None else self._discs(*fitted)
+            centres_px = found[0]
+        assert found is not None
+        return self._discs(*found)
 
     def _settled(
-        self, image: Image, centres_px: list[Point], reach_share: float, steps: int
-    ) -> tuple[list[Point], list[_Shape], Array, Mask, _Edges] | None:
+        self, image: Image, centres_px: list[Point], reach: Reach
+    ) -> tuple[list[Point], Shapes, Array, Mask, _Edges] | None:
         """Return the centres, px, with the rims, last move (2, 3), rays that count and edges."""
-        keep = None
-        for _ in range(steps):
-            front, rear = (self._shape(u, v, reach_share) for u, v in centres_px)
+        keep = found = None
+        for _ in range(STEPS_MAX):
+            front, rear = (self._shape(u, v, reach) for u, v in centres_px)
             if front is None or rear is None:
                 return None
-            rows = np.stack((front.rows, rear.rows))
             edges = self._edges(image, centres_px, (front, rear))
+            rows = np.stack((front.rows, rear.rows))
             fitted = _robust(rows, edges.shift_px, edges.usable, keep)
             if fitted is None:
                 return None
             move, keep = fitted
-            moves = move[:, :2].tolist()
-            centres_px = [
-                (u + du, v + dv) for (u, v), (du, dv) in zip(centres_px, moves, strict=True)
-            ]
+            (du0, dv0), (du1, dv1) = moves = move[:, :2].tolist()
+            (u0, v0), (u1, v1) = centres_px
+            centres_px = [(u0 + du0, v0 + dv0), (u1 + du1, v1 + dv1)]
+            found = centres_px, (front, rear), move, keep, edges
             if max(abs(d) for way in moves for d in way) < SETTLED_PX:
                 break
-        return centres_px, [front, rear], move, keep, edges
+        return found
 
-    def _samples_of(self, reach_share: float) -> int:
-        """Return how many samples a profile has: about one a pixel in the middle of the image."""
+    def _layout_of(self, reach: Reach) -> tuple[int, int]:
+        """Return how many samples a profile has on each side for the edge and for a level.
+
+        They are about a pixel apart in the middle of the image.
+        """
         model = self._model
-        shape = self._projected(0.5 * model.width_px, 0.5 * model.height_px, reach_share, 3)
-        return 2 * max(3, math.ceil(shape.reach_px)) + 1 if shape else 7
+        shape = self._projected(0.5 * model.width_px, 0.5 * model.height_px, reach, (1, 1))
+        radius = shape.radius_px if shape else 1.0
+        edge_px = max(reach[0] * radius, REACH_MIN_PX)
+        return math.ceil(edge_px), max(2, round(reach[1] * radius))
 
-    def _shape(self, u_px: float, v_px: float, reach_share: float) -> _Shape | None:
+    def _shape(self, u_px: float, v_px: float, reach: Reach) -> _Shape | None:
         """Return the rim seen at a pixel, taken from the middle of its cell of the image.
 
         Over half a cell the lens and the distance change a rim's size by 1 % and its middle by
@@ -172,14 +186,14 @@ class RimFitter:
         """
         if not math.isfinite(u_px + v_px):
             return None
-        key = (math.floor(u_px / CELL_PX), math.floor(v_px / CELL_PX), reach_share)
+        key = (math.floor(u_px / CELL_PX), math.floor(v_px / CELL_PX), reach)
         if key not in self._shapes:
             u, v = (key[0] + 0.5) * CELL_PX, (key[1] + 0.5) * CELL_PX
-            self._shapes[key] = self._projected(u, v, reach_share, self._samples[reach_share])
+            self._shapes[key] = self._projected(u, v, reach, self._layouts[reach])
         return self._shapes[key]
 
     def _projected(
-        self, u_px: float, v_px: float, reach_share: float, samples: int
+        self, u_px: float, v_px: float, reach: Reach, layout: tuple[int, int]
     ) -> _Shape | None:
         """Return the rim of a disc with its centre seen at a pixel; None out of sight."""
         floor = self._model.floor_point(u_px, v_px, self._height_m)
@@ -193,16 +207,15 @@ class RimFitter:
         radius = float(support.mean())
         if not radius > 1.0:
             return None
-        reach = min(max(reach_share * radius, NEAR_MIN_PX), 0.8 * radius)
-        steps = reach * np.linspace(-1.0, 1.0, samples)
+        edge, level = layout
+        reach_px = min(max(reach[0] * radius, REACH_MIN_PX), 0.8 * radius)
+        steps = reach_px / edge * np.arange(-edge - level, edge + level + 1)
         maps = arms.T[..., None] + normals.T[..., None] * steps
-        room = float(np.abs(arms).max()) + reach + 1.0
+        room = float(np.abs(arms).max() + steps[-1]) + 1.0
         rows = np.column_stack((normals, support))
-        return _Shape(radius, reach, room, maps.astype(np.float32), rows)
+        return _Shape(radius, reach_px, room, level, maps.astype(np.float32), rows)
 
-    def _edges(
-        self, image: Image, centres_px: list[Point], shapes: tuple[_Shape, _Shape]
-    ) -> _Edges:
+    def _edges(self, image: Image, centres_px: list[Point], shapes: Shapes) -> _Edges:
         """Return the edges found across the rims about the centres."""
         maps = np.stack([shape.maps for shape in shapes], axis=1)
         maps += np.array(centres_px, np.float32).T[:, :, None, None]
@@ -212,7 +225,7 @@ class RimFitter:
             image, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT
         ).astype(np.float32)  # fmt: skip
         response = colours.reshape(2, RAYS * samples, 3) @ self._weights
-        sums = response.reshape(2, RAYS, samples) @ _sums(samples)
+        sums = response.reshape(2, RAYS, samples) @ _sums(samples, shapes[0].level_samples)
         inside = sums[..., 0]
         inner, outer = (self._smooth @ sums[..., :2]).transpose(2, 0, 1)
         rise = inner - outer
@@ -232,7 +245,7 @@ class RimFitter:
         return _Edges(colours.reshape(2, RAYS, -1), swing * reach, usable, typical)
 
     def _discs(
-        self, centres_px: list[Point], shapes: list[_Shape], move: Array, keep: Mask, edges: _Edges
+        self, centres_px: list[Point], shapes: Shapes, move: Array, keep: Mask, edges: _Edges
     ) -> Marks:
         """Return the figures of both fitted discs."""
         seen = np.matmul(keep[:, None].astype(np.float32), edges.colours)[:, 0]
@@ -259,18 +272,20 @@ class RimFitter:
         rest = shift - rows @ move
         residual = math.sqrt(float(rest @ rest) / len(rest))
         sigma = max(residual, EDGE_SIGMA_MIN_PX) * math.sqrt(CORRELATION * _variance(rows))
+        sigma *= 1.0 + ROUGHNESS * residual / shape.radius_px
         share = len(rest) / RAYS
         growth, typical, ground = figures
         return Disc(*centre_px, shape.radius_px, growth, share, residual, sigma, typical, ground)
 
 
 @cache
-def _sums(samples: int) -> NDArray[np.float32]:
-    """Return the sums taken over a profile, (samples, 3): its inner end, outer end, whole mean."""
+def _sums(samples: int, level: int) -> NDArray[np.float32]:
+    """Return the sums taken over a profile, (samples, 3): its inner end, outer end, mean between."""
     sums = np.zeros((samples, 3), np.float32)
-    sums[:2, 0] = sums[-2:, 1] = 0.5
-    sums[:, 2] = 1.0 / (samples - 1)
-    sums[[0, -1], 2] *= 0.5
+    sums[:level, 0] = sums[-level:, 1] = 1.0 / level
+    between = sums[level:-level, 2]
+    between[:] = 1.0 / (len(between) - 1)
+    between[[0, -1]] *= 0.5
     return sums
 
 

@@ -49,6 +49,10 @@ double pixel_offset(double p, double sigma) {
 
 Renderer::Renderer(const View& view, const Scene& scene, const Robot& robot, uint64_t seed)
     : view_(view), scene_(scene), robot_(robot), seed_(seed) {
+    for (Block& block : scene_.blocks) {
+        block.c = std::cos(block.theta);
+        block.s = std::sin(block.theta);
+    }
     const size_t pixels = static_cast<size_t>(view.width) * view.height;
     sight_.resize(pixels);
     for (int v = 0; v < view.height; ++v)

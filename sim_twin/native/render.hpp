@@ -41,6 +41,7 @@ struct Block {
     bool disc = false;
     float x = 0, y = 0, half_x = 0, half_y = 0, theta = 0, top = 0;
     Colour colour{};
+    float c = 1, s = 0;  // of theta, set by the renderer
 };
 
 // Straight flat bar above the robot, m; ends in the world or in the body frame.

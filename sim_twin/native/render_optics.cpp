@@ -18,7 +18,7 @@ void undistort(const View& view, double u, double v, double& x, double& y) {
         const double step = std::fabs(nx - x) + std::fabs(ny - y);
         x = nx;
         y = ny;
-        if (step < 1e-13) break;
+        if (step < 1e-11) break;  // 1e-8 px
     }
 }
 

@@ -54,7 +54,7 @@ inline bool meets_bar(const Bar& bar, const Sight& s) {
 // As meets_box for a block anywhere on the floor; its sides are in half shade.
 bool meets_block(const Block& block, const Sight& s, float& z, float& lit) {
     lit = 1.0f;
-    const float c = std::cos(block.theta), n = std::sin(block.theta);
+    const float c = block.c, n = block.s;
     const float x = s.x - block.x, y = s.y - block.y;
     const Sight local{c * x + n * y, c * y - n * x, c * s.lx + n * s.ly, c * s.ly - n * s.lx};
     if (block.disc) {
