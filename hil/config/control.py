@@ -146,6 +146,12 @@ class EstimatorConfig(Section):
     sigma_scale: float = Field(
         0.15, gt=0, le=1, description="ratio, prior 1 sigma of the distance and turn scales"
     )
+    sigma_d0_m: float = Field(
+        0.005, gt=0, le=0.1, description="m, prior 1 sigma of d0: skid steering moves it about"
+    )
+    d0_walk_m_rad05: float = Field(
+        3e-4, ge=0, le=0.1, description="m/rad^0.5, random walk of d0 over the angle turned"
+    )
     slip_ratio: float = Field(
         0.02, ge=0, le=1, description="m^0.5, random walk of odometry per path"
     )

@@ -12,7 +12,7 @@ import math
 from collections import deque
 from typing import TYPE_CHECKING, NamedTuple
 
-from hil.estimator.filter import DISTANCE, THETA, TURN, PoseFilter
+from hil.estimator.filter import DISTANCE, OFFSET, THETA, TURN, PoseFilter
 from hil.estimator.odometry import (
     BelievedGeometry,
     CommandHistory,
@@ -66,13 +66,18 @@ class Fused:
 
     @property
     def covariance(self) -> list[list[float]]:
-        """Return the covariance of [z1_x, z1_y, theta, k_d, k_t] at the last exposure."""
+        """Return the covariance of [z1_x, z1_y, theta, k_d, k_t, d0] at the last exposure."""
         return [row.copy() for row in self._filter.P]
 
     @property
     def scales(self) -> tuple[float, float]:
         """Return (k_d, k_t): true over believed distance and turn of the same wheel counts."""
         return self._filter.x[DISTANCE], self._filter.x[TURN]
+
+    @property
+    def d0_m(self) -> float:
+        """Return how far the point without lateral speed lies ahead of the centre of mass."""
+        return self._filter.x[OFFSET]
 
     def pose_age_s(self, t_host_s: float) -> float:
         """Return the time since the last exposure that was believed; inf before the first."""
@@ -216,14 +221,14 @@ class Fused:
         """
         if self._t_pose is None:
             return None
-        geometry, scale = self._geometry, self._filter.x
+        geometry, state = self._geometry, self._filter.x
         turned_left, turned_right, left, right = self._ahead(t_host_s)
         if t_host_s < self._t_head:
             x, y, theta = self._back_at(t_host_s)
         else:
             x, y, theta = self._moved(self._head, *geometry.body(turned_left, turned_right))
         forward, turn = geometry.body(left, right)
-        eta1, w = scale[DISTANCE] * forward, scale[TURN] * turn
+        eta1, w = state[DISTANCE] * forward, state[TURN] * turn
         c, s = math.cos(theta), math.sin(theta)
-        pose = Pose(x - geometry.d0_m * c, y - geometry.d0_m * s, theta)
+        pose = Pose(x - state[OFFSET] * c, y - state[OFFSET] * s, theta)
         return Estimate(t_host_s, pose, eta1, w, (x, y), (eta1 * c, eta1 * s))

@@ -13,8 +13,10 @@ from tests.estimator.world import LAG_S, TRUE, Conditions, World
 
 USUAL = Conditions()
 CONFIG = EstimatorConfig(wheel_lag_s=LAG_S)
-# The host believes 10 % less radius and 10 % more track than is true: turns are 22 % off.
-WRONG = BelievedGeometry(TRUE.wheel_radius_m / 1.1, TRUE.track_width_m / 0.9, TRUE.d0_m, 1920)
+# The host believes 10 % less radius and d0, and 10 % more track, than is true: turns are 22 % off.
+WRONG = BelievedGeometry(
+    TRUE.wheel_radius_m / 1.1, TRUE.track_width_m / 0.9, TRUE.d0_m / 1.1, TRUE.counts_per_turn
+)
 
 
 def weave(t):
@@ -64,6 +66,23 @@ def test_scales_absorb_ten_percent_of_radius_and_track():
     assert k_t == pytest.approx(1.1 / 0.9, abs=0.02)
     errors = position_errors(late)
     assert math.sqrt(sum(e * e for e in errors) / len(errors)) < 0.003
+
+
+def test_offset_of_the_flat_output_is_found_in_turns():
+    """10 % of d0 would be 3 mm of z1 for good; after some turning it is below 1 mm."""
+    estimator, world = make(WRONG)
+    world.run(10.0, weave)
+    assert estimator.d0_m == pytest.approx(TRUE.d0_m, abs=0.001)
+    at_rest = world.run(4.0, lambda _: (0.0, 0.0))[60:]
+    assert max(position_errors(at_rest)) < 0.0012
+
+
+def test_driving_straight_says_nothing_about_the_offset():
+    """Without a turn d0 stays as believed, and its uncertainty as it was."""
+    estimator, world = make(WRONG, Conditions(exact=True))
+    world.run(5.0, lambda _: (0.2, 0.0))
+    assert estimator.d0_m == pytest.approx(WRONG.d0_m, abs=2e-4)
+    assert estimator.covariance[5][5] > 0.8 * CONFIG.sigma_d0_m**2
 
 
 def test_estimate_of_a_resting_robot_is_quieter_than_the_camera():

@@ -21,7 +21,7 @@ def law(request):
 
 
 def test_rest_begins_inside_and_ends_beyond_the_wider_circle(law):
-    """Enter within 2.5 mm, stay through 5 mm, leave beyond 6 mm and drive back at once."""
+    """Enter within 2 mm, stay through 5 mm, leave beyond 6 mm and drive back at once."""
     assert law.step(point(1, 0), estimate(0.9, eta1=0.01), DT).eta1_m_s != 0.0
     for x in (0.999, 0.995):
         held = law.step(point(1, 0), estimate(x, eta1=0.01), DT)
