@@ -23,8 +23,7 @@ void HostBoard::set_reset(bool held, std::int64_t t_us, const std::uint8_t pins[
   held_ = held;
   outputs_ = {};
   if (held) return;
-  clock_boot_us_ = powered_ ? 0 : options_.clock_start_us;
-  powered_ = true;
+  clock_boot_us_ = t_us == 0 ? options_.clock_start_us : 0;  // switched on before the run began
   boot_us_ = static_cast<double>(t_us);
   uart_free_us_ = boot_us_;
   ticks_ = 0;

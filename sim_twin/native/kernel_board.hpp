@@ -71,7 +71,6 @@ class HostBoard final : public BoardSide {
   std::size_t edges_done_ = 0;
   std::deque<Chunk> received_;
   bool held_ = true;
-  bool powered_ = false;
   double boot_us_ = 0.0;            // true time at which the board's clock showed clock_boot_us_
   std::uint32_t clock_boot_us_ = 0;
   std::int64_t ticks_ = 0;
