@@ -12,9 +12,10 @@ import json
 import os
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from serial.tools import list_ports
@@ -101,18 +102,23 @@ def build(out: Path | None = None, *, fresh: bool = False) -> Build:
     old = None if fresh else _read_report(out)
     if old is not None and old.build_id == build_id:
         return old
-    objects = out / "objects"
-    shutil.rmtree(objects, ignore_errors=True)
-    objects.mkdir(parents=True)
-    elf, hex_file = out / f"{SKETCH}.elf", out / f"{SKETCH}.hex"
-    commands = _compile_commands(tools, sketch, objects, build_id)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(_run, commands))
-    _run(_link_command(tools, sorted(objects.glob("*.o")), elf))
-    _run([tools.tool("objcopy"), "-O", "ihex", "-R", ".eeprom", str(elf), str(hex_file)])
-    made = Build(build_id, elf, hex_file, *_sizes(tools, elf))
+    out.mkdir(parents=True, exist_ok=True)
+    # Made aside and moved into place, so that a build under way elsewhere meets whole files only.
+    with tempfile.TemporaryDirectory(dir=out) as folder:
+        new = _compile(tools, sketch, Path(folder), build_id)
+        elf, hex_file = new.elf.replace(out / new.elf.name), new.hex.replace(out / new.hex.name)
+    made = replace(new, elf=elf, hex=hex_file)
     _write_report(out, made)
     return made
+
+
+def _compile(tools: Toolchain, sketch: Path, folder: Path, build_id: str) -> Build:
+    elf, hex_file = folder / f"{SKETCH}.elf", folder / f"{SKETCH}.hex"
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(_run, _compile_commands(tools, sketch, folder, build_id)))
+    _run(_link_command(tools, sorted(folder.glob("*.o")), elf))
+    _run([tools.tool("objcopy"), "-O", "ihex", "-R", ".eeprom", str(elf), str(hex_file)])
+    return Build(build_id, elf, hex_file, *_sizes(tools, elf))
 
 
 def _build_id(tools: Toolchain, sketch: Path) -> str:
@@ -188,7 +194,9 @@ def _report_path(out: Path) -> Path:
 
 
 def _write_report(out: Path, made: Build) -> None:
-    _report_path(out).write_text(json.dumps(asdict(made), default=str), encoding="utf-8")
+    new = out / f"build-{os.getpid()}.json"
+    new.write_text(json.dumps(asdict(made), default=str), encoding="utf-8")
+    new.replace(_report_path(out))
 
 
 def _read_report(out: Path) -> Build | None:
