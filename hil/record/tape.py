@@ -30,6 +30,8 @@ _BLOCK = struct.Struct("<cI")
 CLOCK, WAITED = b"C", b"W"
 BYTES, FRAME = b"R", b"F"
 FAULT, INTERRUPT = b"X", b"K"
+# In which call that was: the first byte of the entry's value.
+IN_READ, IN_WRITE, IN_WAIT = b"r", b"w", b"t"
 
 Entry = tuple[bytes, float | bytes]
 
@@ -50,10 +52,10 @@ class TapeWriter:
         """Flush and close; safe to call twice."""
         self._file.close()
 
-    def stop(self, cause: BaseException) -> None:
-        """Note that the rig broke, or that the user stopped the run, at this very place."""
+    def stop(self, place: bytes, cause: BaseException) -> None:
+        """Note that the rig broke, or that the user stopped the run, in this very call."""
         fault = isinstance(cause, RigFault)
-        text = str(cause).encode()
+        text = place + str(cause).encode()
         self.write(_BLOCK.pack(FAULT if fault else INTERRUPT, len(text)) + text)
 
 
@@ -63,13 +65,14 @@ class TapedStream:
     def __init__(self, stream: ByteStream, tape: TapeWriter) -> None:
         self._stream = stream
         self._tape = tape
+        self._read = stream.read
 
     def read(self) -> bytes:
         """Return every byte that has arrived by now, b"" if none."""
         try:
-            data = self._stream.read()
+            data = self._read()
         except (RigFault, KeyboardInterrupt) as cause:
-            self._tape.stop(cause)
+            self._tape.stop(IN_READ, cause)
             raise
         if data:
             self._tape.write(_BLOCK.pack(BYTES, len(data)) + data)
@@ -80,7 +83,7 @@ class TapedStream:
         try:
             self._stream.write(data)
         except (RigFault, KeyboardInterrupt) as cause:
-            self._tape.stop(cause)
+            self._tape.stop(IN_WRITE, cause)
             raise
 
 
@@ -92,11 +95,14 @@ class TapedRig:
         self._tape = tape
         self._kind = WAITED
         self.stream: ByteStream = TapedStream(rig.stream, tape)
+        # These run some hundred times a second: looked up once.
+        self._now_s, self._wait, self._poll_frame = rig.now_s, rig.wait, rig.poll_frame
+        self._write, self._pack = tape.write, _CLOCK.pack
 
     def now_s(self) -> float:
         """Return the host clock."""
-        now_s = self._rig.now_s()
-        self._tape.write(_CLOCK.pack(self._kind, now_s))
+        now_s = self._now_s()
+        self._write(self._pack(self._kind, now_s))
         self._kind = CLOCK
         return now_s
 
@@ -104,16 +110,16 @@ class TapedRig:
         """Return at `until_s`, or earlier as soon as bytes or a frame have arrived."""
         self._kind = WAITED
         try:
-            self._rig.wait(until_s)
+            self._wait(until_s)
         except (RigFault, KeyboardInterrupt) as cause:
-            self._tape.stop(cause)
+            self._tape.stop(IN_WAIT, cause)
             raise
 
     def poll_frame(self) -> Frame | None:
         """Return the oldest frame not yet taken that has arrived by now."""
-        frame = self._rig.poll_frame()
+        frame = self._poll_frame()
         if frame is not None:
-            self._tape.write(FRAME)
+            self._write(FRAME)
         return frame
 
     def begin(self, t_start_s: float) -> None:

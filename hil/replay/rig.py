@@ -40,7 +40,7 @@ class ReplayRig:
     def __init__(
         self, recorded: tape.Tape, frames: Iterator[Frame], truths: Iterator[Truth | None]
     ) -> None:
-        self._entries = recorded.entries
+        self._entries: tuple[tuple[bytes, Any], ...] = recorded.entries
         self._at = 0
         self._now_s = math.nan
         self._fresh = False  # the time after a wait was not asked for yet
@@ -64,7 +64,12 @@ class ReplayRig:
     def wait(self, until_s: float) -> None:  # noqa: ARG002 - the record knows how long it took
         """Go on to the next recorded instant; RigFault at the end of the record."""
         while self._kind() not in {tape.WAITED, b""}:
-            self.raise_recorded()
+            try:
+                self.raise_recorded(tape.IN_WAIT)
+            except (RigFault, KeyboardInterrupt):
+                if self._kind() == tape.WAITED:  # the time after it is the wait's, cut short
+                    self._begin_instant()
+                raise
             self._at += 1
         if self._kind() == b"":
             self._end()
@@ -93,19 +98,21 @@ class ReplayRig:
 
     def take_bytes(self) -> bytes:
         """Return the bytes that were read here, b"" if none."""
-        self.raise_recorded()
+        self.raise_recorded(tape.IN_READ)
         if self._kind() != tape.BYTES:
             return b""
         data: bytes = self._take()
         return data
 
-    def raise_recorded(self) -> None:
-        """Raise again what was raised here."""
-        if self._kind() == tape.FAULT:
-            raise RigFault(self._take().decode(errors="replace"))
-        if self._kind() == tape.INTERRUPT:
-            self._at += 1
-            raise KeyboardInterrupt
+    def raise_recorded(self, place: bytes) -> None:
+        """Raise again what was raised in this call here."""
+        kind = self._kind()
+        if kind not in {tape.FAULT, tape.INTERRUPT} or self._entries[self._at][1][:1] != place:
+            return
+        text: bytes = self._take()
+        if kind == tape.FAULT:
+            raise RigFault(text[1:].decode(errors="replace"))
+        raise KeyboardInterrupt
 
     def _end(self) -> NoReturn:
         self.ended = True
@@ -136,7 +143,7 @@ class _ReplayStream:
 
     def write(self, data: bytes) -> None:  # noqa: ARG002 - see the module
         """Send nowhere; fail where the recorded port failed, and after the record's end."""
-        self._rig.raise_recorded()
+        self._rig.raise_recorded(tape.IN_WRITE)
         if self._rig.ended:
             raise RigFault(END)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from random import Random
@@ -41,10 +42,12 @@ def record(out: Path, *args: Any, **changes: Any) -> RunRecord:
 class WallClock:
     """The twin behind a clock that never shows the same time twice, as a real host's."""
 
-    def __init__(self, rig: Rig, seed: int) -> None:
+    def __init__(self, rig: Rig, seed: int, stop: BaseException | None = None) -> None:
         self._rig = rig
+        self._stop = stop
         self._rng = Random(seed)
         self._last_s = 0.0
+        self._start_s = math.inf
         self.stream = rig.stream
 
     def now_s(self) -> float:
@@ -53,8 +56,11 @@ class WallClock:
         return self._last_s
 
     def wait(self, until_s: float) -> None:
-        """Let the twin go on."""
+        """Let the twin go on; the stop, if any, comes once, a second after the start."""
         self._rig.wait(until_s)
+        if self._stop is not None and self._rig.now_s() > self._start_s + 1.0:
+            stop, self._stop = self._stop, None
+            raise stop
 
     def poll_frame(self) -> Frame | None:
         """Return the twin's frame."""
@@ -63,6 +69,7 @@ class WallClock:
     def begin(self, t_start_s: float) -> None:
         """Pass on."""
         self._rig.begin(t_start_s)
+        self._start_s = t_start_s
 
     def truth(self) -> Truth | None:
         """Know nothing, as on a real rig."""
@@ -73,10 +80,11 @@ class WallClock:
         self._rig.close()
 
 
-def record_on_wall_clock(out: Path) -> RunRecord:
-    """Run it on the twin behind a wall clock."""
+def record_on_wall_clock(out: Path, stop: BaseException | None = None) -> RunRecord:
+    """Run it on the twin behind a wall clock; `stop` is raised in mid-run."""
     own = spec(out)
-    return execute(own, rig=WallClock(open_rig("twin", own.scenario, own.camera, own.seed), 5))
+    twin = open_rig("twin", own.scenario, own.camera, own.seed)
+    return execute(own, rig=WallClock(twin, 5, stop))
 
 
 def unclose(folder: Path) -> None:

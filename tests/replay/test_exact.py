@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hil.errors import BadInput
+from hil.errors import BadInput, RigFault
 from hil.record.journal import read_parquet, write_parquet
 from hil.record.schema import SAMPLE_COLUMNS
 from hil.replay.exact import COMMANDS, replay
@@ -66,6 +66,22 @@ def test_wall_clock_run_comes_out_bit_for_bit(tmp_path: Path) -> None:
     """A host clock that shows another time at each reading does not blur the replay."""
     report = replay(record_on_wall_clock(tmp_path / "run").path)
     assert report.identical, report.first
+
+
+@pytest.mark.parametrize(
+    ("stop", "outcome"),
+    [(KeyboardInterrupt(), "interrupted"), (RigFault("port: unplugged"), "fault")],
+)
+def test_stop_in_mid_run_is_told_again(tmp_path: Path, stop: BaseException, outcome: str) -> None:
+    """Ctrl-C and a port that is gone end the replay where and as they ended the run."""
+    made = record_on_wall_clock(tmp_path / "run", stop)
+    assert made.manifest.outcome == outcome
+    report = replay(made.path)
+    assert report.identical, report.first
+    assert (report.ending.outcome, report.ending.detail) == (
+        made.manifest.outcome, made.manifest.outcome_detail,
+    )  # fmt: skip
+    assert 25 < report.ticks_replayed < 40
 
 
 def test_gain_changed_by_one_percent_is_told_apart(shared: Path) -> None:
