@@ -44,8 +44,14 @@ def command(
     """
     from hil.bringup.robot_file import check_out, write_robot_file
     from hil.config.load import load_robot
+    from hil.targets import SIMULATED
     from hil.targets.serial import parse_target
 
+    if target in SIMULATED:
+        raise BadInput(
+            f"--on {target}: bringup needs a port; to try it on the twin, `hil twin serve --set "
+            "robot.variant=lifted`, then --on serial:/tmp/hil-twin"
+        )
     believed = load_robot(robot)
     device, baud = parse_target(target)
     if out is not None:

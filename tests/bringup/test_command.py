@@ -75,6 +75,13 @@ def test_wheels_on_the_ground_end_it():
     assert "nothing was moved" in run.stderr
 
 
+def test_the_twin_is_tried_through_its_port():
+    """A simulated target is no port: the line says how the twin is brought up."""
+    run = CliRunner().invoke(command, ["--on", "twin", "--yes"])
+    assert isinstance(run.exception, BadInput)
+    assert "hil twin serve --set robot.variant=lifted" in str(run.exception)
+
+
 def test_a_port_that_is_not_there_is_a_rig_fault():
     """Status 3's error names the port."""
     run = CliRunner().invoke(command, ["--on", "serial:/dev/none", "--yes"])
