@@ -242,6 +242,26 @@ def table(frames: int, progress: Progress | None = None) -> list[Row]:
     return rows
 
 
+def as_markdown(rows: list[Row], empty: Empty) -> str:
+    """Return the table as docs/vision.md keeps it."""
+    lines = [
+        "| view | px | condition | mm RMS | deg RMS | worst mm | found | gross | tracking ms"
+        " | first find ms |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    lines += [
+        f"| {r.view} | {r.width_px} x {r.height_px} | {r.condition} | {r.rms_mm:.3f}"
+        f" | {r.rms_deg:.3f} | {r.worst_mm:.2f} | {r.found_ratio:.0%} | {r.gross_errors}"
+        f" | {r.tracking_ms:.2f} | {r.acquisition_ms:.1f} |"
+        for r in rows
+    ]
+    lines.append(
+        f"\nWithout the robot: {empty.accepted} of {empty.frames} frames accepted, in"
+        f" {empty.scenes} scenes of coloured things."
+    )
+    return "\n".join(lines)
+
+
 def as_document(rows: list[Row], empty: Empty) -> dict[str, Any]:
     """Return what `hil bench vision --json` prints."""
     return {"vision": [asdict(line) for line in rows], "empty_scenes": asdict(empty)}
