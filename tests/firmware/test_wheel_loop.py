@@ -49,7 +49,7 @@ def test_both_laws_crawl(law):
 def test_sliding_from_the_first_instant():
     """s(0) = 0 by eta = -mu0 e(0), whatever the error at arming."""
     for speed, wanted in ((0.0, 8.0), (5.0, -3.0), (-2.0, 0.5)):
-        loop = _firmware.WheelLoop(ISM)
+        loop = _firmware.WheelLoop(ISM | {"ISM_MU0": 0.08})
         loop.step_at_speed(speed, wanted)
         assert loop.state.error_rad_s == pytest.approx(speed - wanted)
         assert loop.state.eta == pytest.approx(-0.08 * (speed - wanted), rel=1e-5)
@@ -61,7 +61,7 @@ G = 0.0047
 EXACT = {
     "LAW": 0.0, "FF_GAIN": 0.0, "FF_DEAD": 0.0, "PWM_SLEW": 1000.0, "W_TAU": 0.0, "ISM_G": G,
     "ISM_GAM0": 30.0, "ISM_GAM1": 0.0, "ISM_GAM2": 0.0, "ISM_K0": 0.02, "ISM_MU0": 0.5,
-    "ISM_EPS0": 0.0, "ISM_EPSMIN": 2.0, "ISM_SIGMA": 0.2,
+    "ISM_EPS0": 0.0, "ISM_EPSMIN": 2.0, "ISM_SIGMA": 0.2, "ISM_HOLD": 10_000.0,
 }  # fmt: skip
 
 
@@ -135,9 +135,25 @@ def test_the_boundary_layer_shrinks_to_its_floor():
     assert found[-1] == pytest.approx(0.4)
 
 
+def test_mu_stands_from_its_limit_on():
+    """t + mu0 stops at ISM_HOLD = 0.5 s: then s = e + 2 (E + eta) + Psi with |Psi| <= sigma."""
+    changes = {"ISM_HOLD": 0.5, "ISM_MU0": 0.1, "ISM_SIGMA": 0.3, "ISM_STEP": 60.0}
+    loop = _firmware.WheelLoop(ISM | changes)
+    for _ in range(1000):  # 4 s below the set-point: E and the average only fall
+        loop.step_at_speed(1.99, 2.0)
+    state = loop.state
+    before = (state.error_rad_s, state.integral, state.average)
+    loop.step_at_speed(1.99, 2.0)
+    assert state.t_mu0_s == pytest.approx(0.5, abs=1e-3 + TICK_S)
+    assert state.average == pytest.approx(-0.3 * 0.5)
+    mu = 1.0 / state.t_mu0_s
+    expected = before[0] + mu * (before[1] + state.eta + before[2])
+    assert state.s == pytest.approx(expected, rel=1e-4)
+
+
 def test_only_steps_of_the_set_point_restart_t():
     """30 small changes within ISM_STEP let t run; one change beyond it restarts t with s = 0."""
-    loop = _firmware.WheelLoop(ISM | {"ISM_STEP": 1.0})
+    loop = _firmware.WheelLoop(ISM | {"ISM_STEP": 1.0, "ISM_MU0": 0.08, "ISM_HOLD": 10.0})
     for k in range(30):
         loop.step_at_speed(3.0, 3.0 + 0.03 * k)
     assert loop.state.t_mu0_s == pytest.approx(0.08 + 30 * TICK_S, rel=1e-5)
@@ -148,7 +164,7 @@ def test_only_steps_of_the_set_point_restart_t():
 
 def test_a_step_keeps_what_the_feedback_had_learnt():
     """Under a load the feedback holds 0.1 of duty; over a step only the feed-forward jumps."""
-    loop, motor = _firmware.WheelLoop(ISM), Motor()
+    loop, motor = _firmware.WheelLoop(ISM | {"ISM_STEP": 1.0}), Motor()
     motor.load = 0.1
     drive(loop, motor, 4.0, 2.0)
     before = loop.state.feedback_duty

@@ -46,9 +46,17 @@ void track_error(Wheel& w, const WheelTuning& t) {
 // t = 0 with s(0) = 0. (xb, xa) is (e, E) or, in the derivative form, (de/dt, e); E restarts at 0.
 void restart_sliding(Sliding& sl, const WheelTuning& t, float xb, float xa) {
   sl.t_mu0_s = t.mu0_s;
+  sl.mu = t.mu_start;
   sl.integral = 0.0f;
   sl.average = 0.0f;
   sl.eta = -xa - t.mu0_s * xb;
+}
+
+// mu = 1 / (t + mu0), until it stands.
+void pass_time(Sliding& sl, const WheelTuning& t) {
+  if (sl.t_mu0_s >= t.mu_hold_s) return;
+  sl.t_mu0_s += TICK_S;
+  sl.mu = 1.0f / sl.t_mu0_s;
 }
 
 // eps(t) with beta = 1/2, whose root is the one power soft float can afford; returns |d eps / dt|.
@@ -61,7 +69,7 @@ float boundary_layer(Sliding& sl, const WheelTuning& t, float mu) {
 
 // k(t) s / (|s| + eps(t)): (4.12)-(4.16) with the corrections of control.md section 6.
 float sliding_control(Sliding& sl, const WheelTuning& t, float xb, float xa, float bound) {
-  const float mu = 1.0f / sl.t_mu0_s;
+  const float mu = sl.mu;
   sl.s = xb + mu * (xa + sl.eta + sl.average);
   // mu xb - mu^2 (xa + eta) + mu (sigma sgn xa - Psi), with s put in for the sum it contains
   const float kappa = mu * (xb + xb + with_sign(t.sigma, xa) - sl.s);
@@ -81,9 +89,12 @@ float asg_ism(Wheel& w, const WheelTuning& t) {
   const float xa = derivative ? w.error_rad_s : sl.integral;
   const float push =
       sliding_control(sl, t, xb, xa, w.demand.bound + t.gamma2 * fabsf(w.omega_rad_s));
-  sl.t_mu0_s += TICK_S;
+  pass_time(sl, t);
   if (may_integrate(w, w.error_rad_s)) sl.integral += TICK_S * w.error_rad_s;
-  if (may_integrate(w, xa)) sl.average += with_sign(t.sigma_tick, xa);
+  // |Psi| <= sigma: by itself while mu falls, by the limit once it stands.
+  if (may_integrate(w, xa)) {
+    sl.average = clamp(sl.average + with_sign(t.sigma_tick, xa), t.average_max);
+  }
   if (!derivative) return -push;
   // Relative degree two: the law sets the rate of the duty, and the duty itself stays continuous.
   if (may_integrate(w, push)) w.rate_duty -= TICK_S * push;
@@ -136,8 +147,12 @@ WheelTuning wheel_tuning(const Params& p) {
   t.sigma_tick = p.ism_sigma * TICK_S;
   t.mu0_s = p.ism_mu0_s;
   t.eps0 = p.ism_eps0;
-  t.eps_min = p.ism_eps_min;
-  t.eps_until_s = powf(p.ism_eps0 / p.ism_eps_min, 2.0f / 3.0f);
+  t.mu_start = 1.0f / p.ism_mu0_s;
+  t.mu_hold_s = fmaxf(p.ism_hold_s, p.ism_mu0_s);
+  t.average_max = p.ism_sigma * t.mu_hold_s;
+  // eps(t) stands where mu does, if not before
+  t.eps_min = fmaxf(p.ism_eps_min, p.ism_eps0 * powf(t.mu_hold_s, -1.5f));
+  t.eps_until_s = powf(p.ism_eps0 / t.eps_min, 2.0f / 3.0f);
   t.two_g = 2.0f * p.ism_g_duty_s2_rad;
   t.two_k0 = 2.0f * p.ism_k0_duty;
   t.gamma0 = p.ism_gamma0_rad_s2;

@@ -28,7 +28,8 @@ struct WheelTuning {
   Law law;
   Form form;
   float bump_keep;         // share of the transfer offset left after one tick
-  float sigma, sigma_tick, mu0_s, eps0, eps_min;
+  float sigma, sigma_tick, average_max, mu0_s, mu_start, eps0, eps_min;
+  float mu_hold_s;         // value of t + mu0 at which mu stops falling
   float eps_until_s;       // value of t + mu0 from which eps(t) is at its floor
   float two_g, two_k0, gamma0, gamma1, gamma2, step_rad_s;
   float kp, ki, kd;
@@ -40,6 +41,7 @@ WheelTuning wheel_tuning(const Params& params);
 // Sliding variable and the terms it is made of, control.md section 4.
 struct Sliding {
   float t_mu0_s;   // t + mu0; t restarts at arming and when the set-point steps
+  float mu;        // 1 / (t + mu0)
   float integral;  // E, integral of e (the integral form)
   float average;   // sigma * integral of sgn(xa)
   float eta;       // makes s(0) = 0
