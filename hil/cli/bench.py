@@ -1,4 +1,4 @@
-"""`hil bench`: the speed figures of the harness on this machine."""
+"""`hil bench`: the speed figures of the harness, and the wheel laws on their bench."""
 
 from __future__ import annotations
 
@@ -8,11 +8,76 @@ from hil.cli.options import json_option, print_json
 
 
 @click.command("bench")
+@click.argument(
+    "what", type=click.Choice(["speed", "wheels", "vision", "firmware"]), default="speed"
+)
 @click.option("--runs", type=click.IntRange(1, 100), default=5, show_default=True,
-              help="Counted runs of each figure, after one that is not counted.")  # fmt: skip
+              help="speed: counted runs of each figure, after one that is not counted; "
+              "wheels: robots drawn from 10 % around the believed one.")  # fmt: skip
+@click.option("--tune", "candidates", type=click.IntRange(11, 100_000), metavar="CANDIDATES",
+              help="wheels: search the gains of both laws, that many candidates each.")  # fmt: skip
 @json_option
-def command(runs: int, as_json: bool) -> None:
-    """Measure the speed of the harness: medians of several runs, with least and largest."""
+def command(what: str, runs: int, candidates: int | None, as_json: bool) -> None:
+    r"""Measure the speed of the harness, or compare the wheel laws of the board.
+
+    \b
+    speed   medians of several runs, with least and largest
+    wheels  both wheel laws at step, ramp, crawl, turn, load, friction and battery sag
+    vision  the colour marks on rendered sequences with known truth; some minutes
+    firmware  what the sketch costs the Mega 2560: cycles by part of the tick, load, memory
+    """
+    if what == "speed" and candidates is not None:
+        raise click.UsageError("--tune: the wheels have gains, the speed figures have none")
+    if candidates is not None:
+        _tune_wheels(candidates, as_json)
+    elif what == "wheels":
+        _compare_wheels(runs, as_json)
+    elif what == "vision":
+        _measure_vision(as_json)
+    elif what == "firmware":
+        _measure_firmware(as_json)
+    else:
+        _measure_speed(runs, as_json)
+
+
+def _measure_vision(as_json: bool) -> None:
+    from hil import bench_vision
+
+    def progress(text: str) -> None:
+        click.echo(text, err=True)
+
+    rows = bench_vision.table(100, progress)
+    empty = bench_vision.empty_scenes(10_000, progress)
+    if as_json:
+        print_json(bench_vision.as_document(rows, empty))
+        return
+    click.echo(bench_vision.as_markdown(rows, empty))
+
+
+def _measure_firmware(as_json: bool) -> None:
+    from dataclasses import asdict
+
+    from hil.config.load import load_scenario
+    from sim_twin import firmware_cost
+
+    cost = firmware_cost.measure(load_scenario("scenario-1").robot)
+    if as_json:
+        print_json(asdict(cost))
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    tick_cycles = firmware_cost.CLOCK_HZ / firmware_cost.TICKS_PER_S
+    parts = Table("part", "cycles a tick", "share")
+    for name, cycles in cost.cycles_per_tick.items():
+        parts.add_row(name, f"{cycles:.0f}", f"{cycles / tick_cycles:.1%}")
+    table = Table("budget", "measured", "unit", "limit")
+    for what, value, unit, limit in firmware_cost.budgets(cost):
+        table.add_row(what, f"{value:,.0f}" if value >= 100 else f"{value:.3g}", unit, limit)
+    Console().print(parts, table)
+
+
+def _measure_speed(runs: int, as_json: bool) -> None:
     from hil import bench
 
     found = bench.figures(runs)
@@ -27,3 +92,39 @@ def command(runs: int, as_json: bool) -> None:
         values = (f"{value:.3g}" for value in (figure.median, figure.least, figure.largest))
         table.add_row(figure.name, *values, figure.unit, figure.goal)
     Console().print(table)
+
+
+def _compare_wheels(robots: int, as_json: bool) -> None:
+    from hil import wheel_bench
+
+    found = wheel_bench.table({}, wheel_bench.held_out(robots))
+    if as_json:
+        print_json(wheel_bench.as_document(found))
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("case", "law", *wheel_bench.COLUMNS, title=f"mean of {robots} robots drawn")
+    for case, laws in found.items():
+        for law, values in laws.items():
+            first = case if law == next(iter(laws)) else ""
+            table.add_row(first, law, *wheel_bench.row(values))
+    Console().print(table)
+
+
+def _tune_wheels(candidates: int, as_json: bool) -> None:
+    from hil import wheel_tune
+
+    def progress(what: str, done: int, candidates: int, best: float) -> None:
+        click.echo(f"\r{what}: {done} of {candidates}, cost {best:.4f} ", nl=False, err=True)
+
+    plan = wheel_tune.Plan(candidates=candidates)
+    document = wheel_tune.as_document(plan, wheel_tune.tune(plan, progress))
+    click.echo("", err=True)
+    if as_json:
+        print_json(document)
+        return
+    for name, stage in document["found"].items():
+        click.echo(f"# {name}: cost {stage['start_cost']:.4f} to {stage['cost']:.4f}")
+        for parameter, value in stage["values"].items():
+            click.echo(f"{parameter} = {value:g}")
