@@ -143,16 +143,16 @@ def test_point_is_reached_from_rest_on_either_side_beside_and_behind(outer, star
 
 @pytest.mark.parametrize("outer", ["asg-ism", "pid"])
 def test_wrong_sign_of_b_does_not_reach_the_point(outer, monkeypatch):
-    """Negative control: with the lateral sign of B flipped neither law arrives."""
+    """Negative control: with the lateral sign of B flipped neither law comes within 20 mm in 20 s."""
     from hil.laws import chain  # noqa: PLC0415
 
     right = chain.damped_inverse
     monkeypatch.setattr(
         chain, "damped_inverse", lambda *a, **k: (right(*a, **k)[0], -right(*a, **k)[1])
     )
-    law = make_outer_law(outer, ControlConfig().active_gains, OuterLimits(), D0_M)
+    law = make_outer_law(outer, CIRCLE_GAINS, OuterLimits(), D0_M)
     run = drive_to(law, (-0.6, -0.35, math.pi / 2), (0.05, 0.35))
-    assert run.error((0.05, 0.35)) > 0.1
+    assert min(run.error((0.05, 0.35), index) for index in range(-30, 0)) > 0.020
 
 
 @pytest.mark.parametrize("outer", ["asg-ism", "pid"])
