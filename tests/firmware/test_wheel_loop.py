@@ -136,7 +136,7 @@ def test_the_boundary_layer_shrinks_to_its_floor():
 
 
 def test_mu_stands_from_its_limit_on():
-    """t + mu0 stops at ISM_HOLD = 0.5 s: then s = e + 2 (E + eta) + Psi with |Psi| <= sigma."""
+    """At ISM_HOLD = 0.5 s t + mu0 stops: s = e + 2 (E + eta) + Psi with |Psi| <= sigma."""
     changes = {"ISM_HOLD": 0.5, "ISM_MU0": 0.1, "ISM_SIGMA": 0.3, "ISM_STEP": 60.0}
     loop = _firmware.WheelLoop(ISM | changes)
     for _ in range(1000):  # 4 s below the set-point: E and the average only fall

@@ -33,13 +33,18 @@ def made_up(omega, setpoint, duty, case_s):
     return Trace(t_s, columns[0], columns[1], columns[2], energy_j=0.0, stopped=False)
 
 
+def at_rest(_t_s):
+    """Set-points of a case whose trace is made up."""
+    return 0.0, 0.0
+
+
 def test_figures_of_a_step_by_hand():
     """5 rad/s asked at 0.5 s: 6 from 1.0 s, 5.1 from 1.5 s to the end at 3 s."""
 
     def omega(t):
         return 0.0 if t < 1.0 else 6.0 if t < 1.5 else 5.1
 
-    case = Case(lambda t: (0.0, 0.0), 3.0, 0.5)
+    case = Case(at_rest, 3.0, 0.5)
     trace = made_up(omega, lambda t: 5.0 if t >= 0.5 else 0.0, lambda t: 0.2 * (t >= 1.0), 3.0)
     found = figures(case, trace)
     # 25 over 0.5 s, 1 over 0.5 s, 0.01 over 1.5 s
@@ -53,8 +58,8 @@ def test_figures_of_a_step_by_hand():
 
 def test_a_wheel_that_never_comes_near_never_settles():
     """Half the set-point is reached: settling is infinite, the error stands."""
-    case = Case(lambda t: (0.0, 0.0), 2.0, 0.5)
-    found = figures(case, made_up(lambda t: 1.0, lambda t: 2.0, lambda t: 0.0, 2.0))
+    case = Case(at_rest, 2.0, 0.5)
+    found = figures(case, made_up(lambda _: 1.0, lambda _: 2.0, lambda _: 0.0, 2.0))
     assert math.isinf(found.settling_s)
     assert found.steady_error_rad_s == pytest.approx(1.0)
 
@@ -108,8 +113,7 @@ def test_tuned_beats_the_start_of_the_search_on_a_robot_it_has_not_seen(law):
 
 
 def test_the_printed_fading_weight_leaves_the_load_standing():
-    """1/(t + mu0) of (4.10) against the same law with its weight held: the error under a load
-    that comes 1.5 s after the last step is at least twice as large at the end."""
+    """A load 1.5 s after the last step: where 1/(t + mu0) fades, twice the error stays at least."""
     case = CASES["load step"]
     held, printed = (
         figures(case, run("asg-ism", case, values)) for values in ({}, {"ISM_HOLD": 10_000.0})
