@@ -80,7 +80,8 @@ def test_pwm_is_equal_over_a_whole_run(recorded):
     """
     pairs = feed_to_host_build(*recorded)
     assert len(pairs) > 4000
-    assert sum(pwm != (0, 0) for _, pwm in pairs) > 3000, "the run hardly moved"
+    # about 4 s of way, then rest at the goal
+    assert sum(pwm != (0, 0) for _, pwm in pairs) > 800, "the run hardly moved"
     first = next((item for item in enumerate(pairs) if item[1][0] != item[1][1]), None)
     assert first is None, f"first difference at tick {first[0]}: host, ELF = {first[1]}"
 
