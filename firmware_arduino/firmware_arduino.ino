@@ -48,7 +48,22 @@ void note_load(uint16_t tick_us) {
   g_ticks_to_load_report = 250;
 }
 
-void tick() {
+// Neither is inlined: its frame would lie under everything else that loop() calls.
+__attribute__((noinline)) void start() {
+  motors::start();
+  TCCR0B = TCCR2B = TCCR3B = 0;  // Arduino's timers: nothing here uses millis() or analogWrite()
+  board_init(g_board);
+  storage::load(g_board);
+  if (restart::was_armed()) say(g_board, Text::RESTARTED_ARMED);
+  battery::start();
+  uart::start();
+  encoders::start();
+  set_sleep_mode(SLEEP_MODE_IDLE);
+  ticker::start();
+  restart::start_watchdog();
+}
+
+__attribute__((noinline)) void tick() {
   const uint32_t begin_us = ticker::now_us();
   const encoders::Counts counts = encoders::read();
   const BoardInputs inputs = {begin_us, counts.left, counts.right, counts.illegal,
@@ -65,19 +80,7 @@ void tick() {
 
 }  // namespace
 
-void setup() {
-  motors::start();
-  TCCR0B = TCCR2B = TCCR3B = 0;  // Arduino's timers: nothing here uses millis() or analogWrite()
-  board_init(g_board);
-  storage::load(g_board);
-  if (restart::was_armed()) say(g_board, Text::RESTARTED_ARMED);
-  battery::start();
-  uart::start();
-  encoders::start();
-  set_sleep_mode(SLEEP_MODE_IDLE);
-  ticker::start();
-  restart::start_watchdog();
-}
+void setup() { start(); }
 
 void loop() {
   sleep_until_work();
