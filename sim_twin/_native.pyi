@@ -37,9 +37,7 @@ class Plant:
     def __init__(self, params: PlantParams) -> None: ...
     def reset(self, x_m: float, y_m: float, theta_rad: float) -> None:
         """Put it at rest at a pose with the battery's start charge."""
-    def step(
-        self, h_s: float, duty_left: float, duty_right: float, loads: Sequence[float]
-    ) -> None:
+    def step(self, h_s: float, duty_left: float, duty_right: float, loads: Sequence[float]) -> None:
         """Take one RK4 step with duty (-1..1) and loads (in the order of LOADS) held."""
     def run(
         self, steps: int, h_s: float, duty_left: float, duty_right: float, loads: Sequence[float]
@@ -109,9 +107,7 @@ class Kernel:
         zone: Zone,
     ) -> None:
         """Add a disturbance; times count from `begin`."""
-    def add_fault(
-        self, kind: int, left: bool, right: bool, start_s: float, end_s: float
-    ) -> None:
+    def add_fault(self, kind: int, left: bool, right: bool, start_s: float, end_s: float) -> None:
         """Add a fault; times count from `begin`, and one with start 0 is there before it too."""
     def begin(self, t_us: int) -> None:
         """Let the times of disturbances and faults count from `t_us`."""
@@ -243,9 +239,7 @@ class Renderer:
     """Draws frames of one scene from one view."""
 
     def __init__(self, view: View, scene: Scene, robot: Robot, seed: int) -> None: ...
-    def make(
-        self, index: int, poses: Sequence[tuple[float, float, float]]
-    ) -> NDArray[np.uint8]:
+    def make(self, index: int, poses: Sequence[tuple[float, float, float]]) -> NDArray[np.uint8]:
         """Return frame `index`, (height, width, 3) BGR; no poses: the empty scene."""
 
 def floor_map(view: View) -> NDArray[np.float64]:

@@ -12,5 +12,7 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     reporter = session.config.pluginmanager.get_plugin("terminalreporter")
     skipped = reporter.stats.get("skipped", []) if reporter is not None else []
     if skipped and exitstatus == 0 and os.environ.get("HIL_NO_SKIPS"):
-        reporter.write_line(f"{len(skipped)} tests were skipped: HIL_NO_SKIPS asks for all", red=True)
+        reporter.write_line(
+            f"{len(skipped)} tests were skipped: HIL_NO_SKIPS asks for all", red=True
+        )
         session.exitstatus = pytest.ExitCode.TESTS_FAILED

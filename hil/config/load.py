@@ -175,7 +175,9 @@ def put_value(tree: Tree, key: str, value: Any) -> None:
     parent, leaf = _find(tree, key)
     if parent is None:
         near = difflib.get_close_matches(key, names, n=3, cutoff=0.5)
-        same_end = [name for name in names if name.split(".")[-1] == key.split(".")[-1]]
+        same_end = [
+            name for name in names if name.split(".")[-1] == key.rsplit(".", maxsplit=1)[-1]
+        ]
         hint = " or ".join(dict.fromkeys([*same_end[:2], *near])) or f"top level: {', '.join(tree)}"
         raise BadInput(f"--set {key}: no such value; near: {hint}")
     parent[leaf] = value
