@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shlex
-from importlib import resources
 from pathlib import Path
 
 import click
@@ -12,7 +11,7 @@ import pytest
 
 from hil.cli.main import cli
 
-ROOT = Path(str(resources.files("hil"))).parent
+ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "docs" / name for name in ("bring-up.md", "debugging.md")]
 SOURCES = [
     *(path for name in ("hil", "vision", "sim_twin") for path in (ROOT / name).rglob("*.py")),
