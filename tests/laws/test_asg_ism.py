@@ -155,6 +155,27 @@ def test_wrong_sign_of_b_does_not_reach_the_point(outer, monkeypatch):
     assert min(run.error((0.05, 0.35), index) for index in range(-30, 0)) > 0.020
 
 
+def arrives_without_spinning(outer):
+    """Whether the shipped gains bring the robot within 20 mm in less than half a turn."""
+    law = make_outer_law(outer, ControlConfig().active_gains, OuterLimits(), D0_M)
+    run = drive_to(law, (-0.6, -0.35, math.pi / 2), (0.05, 0.35))
+    worst = max(run.error((0.05, 0.35), index) for index in range(-30, 0))
+    return worst < 0.020 and abs(run.theta[-1] - math.pi / 2) < math.pi
+
+
+@pytest.mark.parametrize("outer", ["asg-ism", "pid"])
+def test_wrong_sign_of_b_is_told_by_error_or_turn_with_the_shipped_gains(outer, monkeypatch):
+    """Fast gains can drift onto the point while spinning: the error alone would not tell."""
+    from hil.laws import chain  # noqa: PLC0415
+
+    assert arrives_without_spinning(outer)
+    right = chain.damped_inverse
+    monkeypatch.setattr(
+        chain, "damped_inverse", lambda *a, **k: (right(*a, **k)[0], -right(*a, **k)[1])
+    )
+    assert not arrives_without_spinning(outer)
+
+
 @pytest.mark.parametrize("outer", ["asg-ism", "pid"])
 def test_same_steps_give_the_same_commands_after_a_reset(outer):
     """A law holds no state across reset: a second run is bit-identical to the first."""
