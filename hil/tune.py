@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
 from hil.config.control import Gains
@@ -219,6 +218,13 @@ def tune(
 ) -> Gains:
     """Return the tuned gains of both laws with their origin; `base` holds what is not searched."""
     found = {outer: search(outer, base, evaluate, plan, progress) for outer in SEARCH}
+    return with_origin(base, found, plan, target=target, revision=revision)
+
+
+def with_origin(
+    base: Gains, found: Mapping[str, Found], plan: Plan, *, target: str, revision: str
+) -> Gains:
+    """Return `base` with what was found for each law, and where it comes from."""
     gains = base
     origin: dict[str, Any] = {
         "procedure": "hil.tune: CMA-ES on log gains, see docs/control.md",
@@ -264,23 +270,26 @@ def case_scenario(case: Case, gains: Gains) -> Scenario:
     return scenario.model_copy(update=changed)
 
 
-def evaluate_on(target: str, camera: str) -> Evaluate:
-    """Return an `evaluate` that runs the case on a target; a run that ends early has no figures."""
-    from hil.run import RunSpec, execute  # noqa: PLC0415 - the search itself needs no target
+@dataclass(frozen=True, slots=True)
+class OnTarget:
+    """An `Evaluate` that runs each case on a target; a run that ends early has no figures."""
 
-    def evaluate(outer: str, gains: Gains, case: Case, seed: int) -> Figures:
-        with TemporaryDirectory(prefix="hil-tune-") as folder:
-            spec = RunSpec(
-                scenario=case_scenario(case, gains),
-                target=target,
-                camera=camera,
-                outer=outer,
-                inner=case.inner,
-                seed=seed,
-                out=Path(folder) / "run",
-                rerun=False,
-            )
-            record = execute(spec)
-            return record.figures().values if record.manifest.outcome == "complete" else {}
+    target: str
+    camera: str
 
-    return evaluate
+    def __call__(self, outer: str, gains: Gains, case: Case, seed: int) -> Figures:
+        """Return the figures of one run, which leaves no record behind."""
+        from hil.run import RunSpec, execute_in_memory  # noqa: PLC0415 - the search needs no target
+
+        spec = RunSpec(
+            scenario=case_scenario(case, gains),
+            target=self.target,
+            camera=self.camera,
+            outer=outer,
+            inner=case.inner,
+            seed=seed,
+            out=Path(),
+            command="hil tune",
+        )
+        record = execute_in_memory(spec)
+        return record.figures().values if record.manifest.outcome == "complete" else {}

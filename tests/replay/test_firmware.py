@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
 
 from hil.errors import BadInput
-from hil.replay.firmware import replay_wheels
+from hil.replay.firmware import elf, replay_wheels
+from tests.pil.rigs import needs_toolchain
 from tests.replay.records import cut, record
 
 
@@ -53,3 +55,38 @@ def test_too_short_a_log_is_refused(tmp_path: Path) -> None:
     cut(path / "link.tlog", 0.3)
     with pytest.raises(BadInput, match="reports while armed"):
         replay_wheels(path)
+
+
+@needs_toolchain
+@pytest.mark.parametrize("target", ["twin", "pil"])
+def test_the_elf_sets_the_pwm_of_the_core(tmp_path: Path, target: str) -> None:
+    """The binary under simavr, by UART and encoder pins, agrees with the core at every phase."""
+    path = record(tmp_path / "run", ("duration_s=3",), target=target).path
+    on_core, on_elf = replay_wheels(path), replay_wheels(path, firmware=elf())
+    assert on_elf.left.rms_recorded > 50
+    assert on_elf.phase_us == on_core.phase_us
+    assert on_elf.left.rms_difference == pytest.approx(on_core.left.rms_difference, rel=0.05)
+    assert on_elf.right.rms_difference == pytest.approx(on_core.right.rms_difference, rel=0.05)
+    assert "on the ELF (simavr)" in on_elf.text()
+    assert on_elf.build_here != on_core.build_here
+
+
+@needs_toolchain
+def test_changed_board_parameter_shows_on_the_elf(made: Path) -> None:
+    """Negative control: the ELF without feed-forward is told apart, and like the core's shadow."""
+    changes = ["board.FF_GAIN=0", "board.FF_DEAD=0"]
+    same = replay_wheels(made, firmware=elf())
+    other, on_core = replay_wheels(made, None, changes, elf()), replay_wheels(made, None, changes)
+    assert other.shadow
+    assert other.left.rms_difference > 2 * same.left.rms_difference
+    assert other.left.rms_difference == pytest.approx(on_core.left.rms_difference, rel=0.05)
+
+
+def test_without_simavr_the_elf_is_refused_in_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The line has the packages to install."""
+    monkeypatch.setitem(sys.modules, "sim_twin._pil", None)
+    with pytest.raises(BadInput, match=r"through the ELF.*apt install") as told:
+        elf()
+    assert "\n" not in str(told.value)
