@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from hil.errors import BadInput, RigFault
 from hil.targets.base import Frame
-from hil.targets.frames import FrameQueue
+from hil.targets.frame_queue import FrameQueue
 from vision import cv_compat
 
 Image = NDArray[np.uint8]
