@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 @click.option("--inner", type=LAWS, help="Shadow: PWM that this wheel law would have set.")
 @click.option("--firmware", is_flag=True,
               help="Also replay set-points and encoder counts through the firmware core.")  # fmt: skip
+@click.option("--elf", is_flag=True,
+              help="As --firmware, through the board's own binary on a simulated processor.")  # fmt: skip
 @click.option("--fit", is_flag=True,
               help="Also fit a twin to RUN and run the other law on it, in closed loop.")  # fmt: skip
 @set_option
@@ -30,6 +32,7 @@ def command(
     outer: str | None,
     inner: str | None,
     firmware: bool,
+    elf: bool,
     fit: bool,
     overrides: tuple[str, ...],
     out: Path | None,
@@ -43,25 +46,26 @@ def command(
     the shadow, so this is open loop and no verdict on the other law.
 
     --firmware, --inner or a --set of a board parameter sends the recorded set-points and encoder
-    counts through the firmware core and compares its PWM with the recorded one. --fit answers in
+    counts through the firmware core and compares its PWM with the recorded one; with --elf through
+    the ELF that is uploaded to the board, under simavr. --fit answers in
     closed loop, on a twin whose parameters are fitted to RUN, with the residual of that fit.
     """
     from hil.cli.progress import run_progress
     from hil.record.manifest import read_manifest
+    from hil.replay import firmware as wheel_replay
     from hil.replay.exact import replay
-    from hil.replay.firmware import replay_wheels
     from hil.replay.output import claim_folder, write_output
     from hil.replay.what_if import what_if
 
     duration_s = float(read_manifest(run).scenario.get("duration_s", 0.0))
+    through = wheel_replay.elf() if elf else wheel_replay.core()
     if out is not None:
         claim_folder(out)
     with run_progress({run.name: duration_s}) as update:
         report = replay(run, outer, overrides, lambda t_s: update(run.name, t_s))
     board_changes = [text for text in overrides if text.startswith("board.")]
-    wheels = (
-        replay_wheels(run, inner, board_changes) if firmware or inner or board_changes else None
-    )
+    asked = firmware or elf or inner or board_changes
+    wheels = wheel_replay.replay_wheels(run, inner, board_changes, through) if asked else None
     answer = what_if(run, outer, overrides) if fit else None
     document = report.to_json() | {
         "firmware": wheels.to_json() if wheels else None,

@@ -1,4 +1,6 @@
-"""Recorded set-points and encoder counts through the firmware core again, PWM compared.
+"""Recorded set-points and encoder counts through the firmware again, PWM compared.
+
+The firmware is the core compiled for this machine, or the ELF on a simulated processor (elf.py).
 
 A report gives the counts of every fifth tick only, and a set-point's arrival as the board stamped
 it. Between reports the counts are interpolated, so PWM cannot come out bit for bit: what is
@@ -9,8 +11,7 @@ another wheel law it is a shadow: the wheels followed the recorded PWM.
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,11 +19,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from hil._firmware import BUILD_ID, TICK_US, Board
+from hil._firmware import BUILD_ID, TICK_US, Board, parameter_hash
 from hil.config.load import build, check_board, set_value
 from hil.config.scenario import Scenario
 from hil.errors import BadInput
 from hil.record import layout
+from hil.replay.elf import elf_board
 from hil.replay.exact import Source, read_source
 from hil.run import board_parameters
 from hil.wire import dialect
@@ -47,6 +49,7 @@ _LEFT_OUT = frozenset(
     }
 )
 _BOOT_US = 2_000_000
+_WHERE = {"core": "the core", "elf": "the ELF (simavr)"}
 
 
 class Sent(NamedTuple):
@@ -54,6 +57,21 @@ class Sent(NamedTuple):
 
     t_us: int
     frame: bytes
+
+
+class Tick(NamedTuple):
+    """When the board ticked, in unwrapped board time, and what its encoders (left, right) read."""
+
+    t_us: int
+    counts: tuple[int, int]
+
+
+class Firmware(NamedTuple):
+    """What a replay goes through; `pwm` gives (left, right) in counts at each tick."""
+
+    name: str
+    build_id: str
+    pwm: Callable[[Sequence[Sent], Sequence[Tick]], list[tuple[int, int]]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +86,12 @@ class Side:
 
 @dataclass(frozen=True, slots=True)
 class FirmwareReport:
-    """How well the core's PWM agrees with the recorded one; `shadow` when the law was changed."""
+    """How well the firmware's PWM agrees with the recorded one; `shadow` when the law was changed.
 
+    `firmware` is "core" or "elf".
+    """
+
+    firmware: str
     build_recorded: str
     build_here: str
     inner: str
@@ -92,7 +114,8 @@ class FirmwareReport:
         """Return the result in two or three lines for a person."""
         kind = "shadow of the wheel law" if self.shadow else "firmware replay of the wheel law"
         lines = [
-            f"{kind} {self.inner}: {self.reports} reports, encoder phase {self.phase_us} us",
+            f"{kind} {self.inner} on {_WHERE[self.firmware]}: {self.reports} reports, "
+            f"encoder phase {self.phase_us} us",
             *(
                 f"  PWM {name}: {side.rms_difference:.1f} counts RMS apart of "
                 f"{side.rms_recorded:.1f} RMS, correlation {side.correlation:.4f}, "
@@ -119,9 +142,15 @@ class Trace:
 
 
 def replay_wheels(
-    path: Path, inner: str | None = None, overrides: Sequence[str] = ()
+    path: Path,
+    inner: str | None = None,
+    overrides: Sequence[str] = (),
+    firmware: Firmware | None = None,
 ) -> FirmwareReport:
-    """Replay a record's wheel loops; with another wheel law or board parameters, as a shadow."""
+    """Replay a record's wheel loops; with another wheel law or board parameters, as a shadow.
+
+    They go through the core unless another firmware is given.
+    """
     source = read_source(path)
     tree = dict(source.manifest.scenario)
     for text in overrides:
@@ -130,13 +159,29 @@ def replay_wheels(
     check_board(scenario.board)
     law = inner or source.manifest.inner
     shadow = bool(overrides) or law != source.manifest.inner
-    return replay_firmware(source, board_parameters(scenario, law), law, shadow=shadow)
+    parameters = board_parameters(scenario, law)
+    return replay_firmware(source, parameters, law, firmware or core(), shadow=shadow)
+
+
+def core() -> Firmware:
+    """Return the firmware core compiled for this machine."""
+    return Firmware("core", BUILD_ID, _core_pwm)
+
+
+def elf() -> Firmware:
+    """Return the ELF under simavr; BadInput with the packages that are missing, if any."""
+    return Firmware("elf", *elf_board())
 
 
 def replay_firmware(
-    source: Source, parameters: Mapping[str, float], inner: str, *, shadow: bool
+    source: Source,
+    parameters: Mapping[str, float],
+    inner: str,
+    firmware: Firmware,
+    *,
+    shadow: bool,
 ) -> FirmwareReport:
-    """Run the core on a record's set-points and counts; raises BadInput without enough of them."""
+    """Run it on a record's set-points and counts; raises BadInput without enough of them."""
     trace, arrivals = read_reports(source)
     if int(trace.armed.sum()) < _LEAST_REPORTS:
         raise BadInput(
@@ -144,13 +189,13 @@ def replay_firmware(
             f"{_LEAST_REPORTS} are needed for a firmware replay"
         )
     sent = sent_frames(source, arrivals)
-    found = {phase: _run(trace, sent, parameters, phase) for phase in PHASES_US}
+    found = {phase: _run(firmware, trace, sent, parameters, phase) for phase in PHASES_US}
     rms = {phase: _rms(pwm[trace.armed] - trace.pwm[trace.armed]) for phase, pwm in found.items()}
     # Without a clear best phase (a shadow, or a wheel at rest) the tick itself is the honest one.
     best = min(rms, key=lambda phase: (round(rms[phase], 3), abs(phase))) if not shadow else 0
     pwm = found[best][trace.armed]
     return FirmwareReport(
-        source.manifest.firmware_build_id, BUILD_ID, inner, shadow,
+        firmware.name, source.manifest.firmware_build_id, firmware.build_id, inner, shadow,
         int(trace.armed.sum()), best, {k: round(v, 3) for k, v in rms.items()},
         *(_side(trace.pwm[trace.armed][:, i], pwm[:, i]) for i in (0, 1)),
     )  # fmt: skip
@@ -215,52 +260,72 @@ def decoded(frame: bytes) -> Any:
 
 
 def _run(
-    trace: Trace, sent: Sequence[Sent], parameters: Mapping[str, float], phase_us: int
+    firmware: Firmware,
+    trace: Trace,
+    sent: Sequence[Sent],
+    parameters: Mapping[str, float],
+    phase_us: int,
 ) -> Array:
-    """Return the core's PWM (n, 2) at the tick of every report."""
-    board, writer = Board(), FrameWriter()
-    _boot(board, writer, parameters, int(trace.t_us[0]))
-    curves = [PchipInterpolator(trace.t_us, trace.counts[:, i]) for i in (0, 1)]
-    pwm = np.zeros((trace.t_us.size, 2))
-    times = [item.t_us for item in sent]
+    """Return the firmware's PWM (n, 2) at the tick of every report."""
+    writer = FrameWriter()
     begin = int(trace.t_us[0]) - TICK_US
-    place = bisect_left(times, begin)
-    for number, end in enumerate(trace.t_us.tolist()):
-        ticks = np.linspace(begin, end, max(round((end - begin) / TICK_US), 1) + 1)[1:]
-        counts = [np.rint(curve(np.minimum(ticks + phase_us, trace.t_us[-1]))) for curve in curves]
-        for tick_us, left, right in zip(ticks.tolist(), *counts, strict=True):
-            while place < len(sent) and sent[place].t_us <= tick_us:
-                frame = _own_arming(sent[place].frame, board, writer)
-                board.receive(frame, sent[place].t_us % _WRAP_US)
-                place += 1
-            pwm[number] = board.tick(round(tick_us) % _WRAP_US, int(left), int(right))
-            board.transmit()
+    frames = _boot(writer, parameters, begin)
+    ticks = [Tick(item.t_us, _counts(trace.counts[0])) for item in frames]
+    own = parameter_hash(parameters)
+    frames += [
+        Sent(item.t_us, _own_arming(item.frame, own, writer)) for item in sent if item.t_us >= begin
+    ]
+    curves = [PchipInterpolator(trace.t_us, trace.counts[:, i]) for i in (0, 1)]
+    places = []
+    for end in trace.t_us.tolist():
+        times = np.linspace(begin, end, max(round((end - begin) / TICK_US), 1) + 1)[1:]
+        at = np.clip(times + phase_us, trace.t_us[0], trace.t_us[-1])
+        counts = np.rint(np.column_stack([curve(at) for curve in curves]))
+        ticks += [Tick(round(t), _counts(c)) for t, c in zip(times.tolist(), counts, strict=True)]
+        places.append(len(ticks) - 1)
         begin = end
+    return np.array(firmware.pwm(frames, ticks), float)[places]
+
+
+def _counts(row: NDArray[Any]) -> tuple[int, int]:
+    return int(row[0]), int(row[1])
+
+
+def _core_pwm(frames: Sequence[Sent], ticks: Sequence[Tick]) -> list[tuple[int, int]]:
+    board, pwm, place = Board(), [], 0
+    for tick in ticks:
+        while place < len(frames) and frames[place].t_us <= tick.t_us:
+            board.receive(frames[place].frame, frames[place].t_us % _WRAP_US)
+            place += 1
+        pwm.append(board.tick(tick.t_us % _WRAP_US, *tick.counts))
+        board.transmit()
     return pwm
 
 
-def _boot(board: Board, writer: FrameWriter, parameters: Mapping[str, float], end_us: int) -> None:
-    """Set the parameters by the link, as a host would, before the first recorded tick."""
-    t_us = end_us - _BOOT_US
-    for name, value in parameters.items():
-        message = dialect.MAVLink_param_set_message(
-            BOARD_SYSTEM, BOARD_COMPONENT, name.encode(), value, dialect.MAV_PARAM_TYPE_REAL32
+def _boot(writer: FrameWriter, parameters: Mapping[str, float], end_us: int) -> list[Sent]:
+    """Return what sets the parameters by the link, as a host would, before the recorded ticks."""
+    return [
+        Sent(
+            end_us - _BOOT_US + i * TICK_US,
+            writer.encode(
+                dialect.MAVLink_param_set_message(
+                    BOARD_SYSTEM, BOARD_COMPONENT, name.encode(), value,
+                    dialect.MAV_PARAM_TYPE_REAL32,
+                )
+            ),
         )
-        board.receive(writer.encode(message), t_us % _WRAP_US)
-        board.tick(t_us % _WRAP_US, 0, 0)
-        board.transmit()
-        t_us += TICK_US
+        for i, (name, value) in enumerate(parameters.items())
+    ]  # fmt: skip
 
 
-def _own_arming(frame: bytes, board: Board, writer: FrameWriter) -> bytes:
-    """Return the frame; an arming with the hashes of this board in place of the recorded one's."""
+def _own_arming(frame: bytes, own: int, writer: FrameWriter) -> bytes:
+    """Return the frame; an arming with this firmware's parameter hash for the recorded one's."""
     if int.from_bytes(frame[7:10], "little") != dialect.MAVLINK_MSG_ID_COMMAND_LONG:
         return frame
     command = decoded(frame)
     arms = command.command == dialect.MAV_CMD_COMPONENT_ARM_DISARM and command.param1 == 1.0
     if not arms:
         return frame
-    own = board.parameter_hash
     return writer.encode(
         dialect.MAVLink_command_long_message(
             BOARD_SYSTEM, BOARD_COMPONENT, command.command, command.confirmation,

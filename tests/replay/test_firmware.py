@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 from hil.errors import BadInput
-from hil.replay.firmware import elf, replay_wheels
+from hil.replay.firmware import PHASES_US, Sent, Tick, core, elf, replay_wheels
 from tests.pil.rigs import needs_toolchain
 from tests.replay.records import cut, record
 
@@ -60,15 +61,29 @@ def test_too_short_a_log_is_refused(tmp_path: Path) -> None:
 @needs_toolchain
 @pytest.mark.parametrize("target", ["twin", "pil"])
 def test_the_elf_sets_the_pwm_of_the_core(tmp_path: Path, target: str) -> None:
-    """The binary under simavr, by UART and encoder pins, agrees with the core at every phase."""
+    """The binary under simavr, by UART and encoder pins, sets the core's PWM at every phase.
+
+    But for the disarming, whose arrival no report tells: on the ELF its 44 bytes take 7.6 ms, two
+    ticks in which the core is off already.
+    """
     path = record(tmp_path / "run", ("duration_s=3",), target=target).path
-    on_core, on_elf = replay_wheels(path), replay_wheels(path, firmware=elf())
-    assert on_elf.left.rms_recorded > 50
-    assert on_elf.phase_us == on_core.phase_us
-    assert on_elf.left.rms_difference == pytest.approx(on_core.left.rms_difference, rel=0.05)
-    assert on_elf.right.rms_difference == pytest.approx(on_core.right.rms_difference, rel=0.05)
-    assert "on the ELF (simavr)" in on_elf.text()
-    assert on_elf.build_here != on_core.build_here
+    on_elf = elf()
+    differing: list[list[tuple[int, int]]] = []
+    moving = []
+
+    def both(frames: Sequence[Sent], ticks: Sequence[Tick]) -> list[tuple[int, int]]:
+        pwm, of_core = on_elf.pwm(frames, ticks), core().pwm(frames, ticks)
+        differing.append([b for a, b in zip(pwm, of_core, strict=True) if a != b])
+        moving.append(sum(a != (0, 0) for a in pwm))
+        return pwm
+
+    report = replay_wheels(path, firmware=on_elf._replace(pwm=both))
+    assert len(differing) == len(PHASES_US)
+    assert min(moving) > 500
+    assert all(len(of_core) <= 2 and {*of_core} <= {(0, 0)} for of_core in differing)
+    assert report.left.rms_difference < 0.2 * report.left.rms_recorded
+    assert "on the ELF (simavr)" in report.text()
+    assert report.to_json()["firmware"] == "elf"
 
 
 @needs_toolchain
