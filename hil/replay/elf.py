@@ -31,6 +31,9 @@ _ASKED_US = 120_000
 _ANSWERED_US = 150_000
 # A step of the pins ends this much before the tick, so that its last edge is counted by then.
 _LEAD_US = 150
+# A frame stamped behind a tick comes at least this much behind it: the board looks for bytes between
+# waking up and the tick, and would take it into that tick.
+_BEHIND_US = 50
 _BATTERY_V = 12.0  # as the core's binding has it
 _AB = (0b00, 0b10, 0b11, 0b01)  # lines of an encoder over a period, forward
 
@@ -61,7 +64,9 @@ def elf_pwm(elf: Path, frames: Sequence[Sent], ticks: Sequence[Tick]) -> Pwm:
     # A tick's stamp is late by what the processor was busy with; frames are timed by the usual one.
     zero_us = ticks[0].t_us + round(float(np.median(stamps - numbers * TICK_US)))
     for item in _on_the_line(frames, 10 * 1e6 / UART_BAUD):  # start bit, 8 bits, stop bit
-        board.receive(first_us + item.t_us - zero_us, item.frame)
+        behind_us = (item.t_us - zero_us) % TICK_US
+        held_us = _BEHIND_US - behind_us if 0 < behind_us < _BEHIND_US else 0
+        board.receive(first_us + item.t_us - zero_us + held_us, item.frame)
     times = [*(first_us + numbers * TICK_US).tolist(), first_us + int(numbers[-1] + 1) * TICK_US]
     pwm = []
     for (tick, after), (begin, end) in zip(

@@ -59,14 +59,14 @@ def test_too_short_a_log_is_refused(tmp_path: Path) -> None:
 
 
 @needs_toolchain
-@pytest.mark.parametrize("target", ["twin", "pil"])
-def test_the_elf_sets_the_pwm_of_the_core(tmp_path: Path, target: str) -> None:
+@pytest.mark.parametrize(("target", "inner"), [("twin", "pid"), ("pil", "asg-ism")])
+def test_the_elf_sets_the_pwm_of_the_core(tmp_path: Path, target: str, inner: str) -> None:
     """The binary under simavr, by UART and encoder pins, sets the core's PWM at every phase.
 
     But for the disarming, whose arrival no report tells: on the ELF its 44 bytes take 7.6 ms, two
     ticks in which the core is off already.
     """
-    path = record(tmp_path / "run", ("duration_s=3",), target=target).path
+    path = record(tmp_path / "run", ("duration_s=3",), target=target, inner=inner).path
     on_elf = elf()
     differing: list[list[tuple[int, int]]] = []
     moving = []
