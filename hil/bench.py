@@ -14,6 +14,7 @@ from typing import Any
 
 from hil.config.load import load_scenario
 from hil.run import RunSpec, execute
+from hil.targets import open_rig
 from sim_twin.pil import pil_is_missing
 
 _SCENARIO = "scenario-1"
@@ -42,7 +43,7 @@ def measure(name: str, unit: str, goal: str, runs: int, once: Callable[[], float
 def real_time_factor(camera: str, *, target: str = "twin", record: bool = True) -> float:
     """Return simulated seconds per wall second of one whole run, record included.
 
-    The simulated time is that of the controlled part; connecting and stopping come on top of it.
+    The simulated time is all that passed on the rig: connecting, the controlled part, stopping.
     """
     scenario = load_scenario(_SCENARIO)
     with tempfile.TemporaryDirectory() as folder:
@@ -58,8 +59,10 @@ def real_time_factor(camera: str, *, target: str = "twin", record: bool = True) 
             command="hil bench",
         )
         start_s = time.perf_counter()
-        execute(spec)
-        return scenario.duration_s / (time.perf_counter() - start_s)
+        rig = open_rig(spec.target, scenario, spec.camera, spec.seed)
+        begin_s = rig.now_s()
+        execute(spec, rig=rig)
+        return (rig.now_s() - begin_s) / (time.perf_counter() - start_s)
 
 
 def kernel_step_us() -> float:

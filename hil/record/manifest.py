@@ -126,6 +126,7 @@ def file_entry(path: Path) -> FileEntry:
     return FileEntry(bytes=path.stat().st_size, sha256=digest)
 
 
+@functools.cache
 def collect_versions() -> dict[str, str]:
     """Return the versions of the interpreter and of the packages that decide a run's numbers."""
     found = {"python": platform.python_version(), "platform": platform.platform(terse=True)}
