@@ -117,9 +117,10 @@ class PoseFilter:
                 return False
             gain = [value / total for value in ph]
             change = [a + k * left for a, k in zip(change, gain, strict=True)]
+            p0, p1, p2, p3, p4, p5 = ph  # written out: this runs for every frame
             P = [
-                [a - k * b for a, b in zip(row, ph, strict=True)]
-                for row, k in zip(P, gain, strict=True)
+                [a - k * p0, b - k * p1, c_ - k * p2, d - k * p3, e - k * p4, f - k * p5]
+                for (a, b, c_, d, e, f), k in zip(P, gain, strict=True)
             ]
         self.P = P
         self.x = [a + b for a, b in zip(self.x, change, strict=True)]
