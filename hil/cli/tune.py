@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
 
 
 @click.command("tune")
@@ -48,10 +53,15 @@ def command(candidates: int, seed: int, camera: str, out: Path) -> None:
         for law in SEARCH:
             bar = bars.add_task(f"{law}: {candidates} candidates, {runs} runs", total=1)
             futures[law] = pool.submit(search, law, base, evaluate, plan)
-            futures[law].add_done_callback(lambda _, bar=bar: bars.update(bar, completed=1))
+            futures[law].add_done_callback(partial(_finish, bars, bar))
         found = {law: future.result() for law, future in futures.items()}
     gains = with_origin(base, found, plan, target=f"twin, {camera} camera", revision=git_revision())
     write_gain_set(out, gains)
     for law, result in found.items():
         click.echo(f"{law}: cost {result.cost:.4f}, {result.start_cost:.4f} at the start")
     click.echo(f"gain set: {out}")
+
+
+def _finish(bars: Progress, bar: TaskID, _done: Any) -> None:
+    """Fill a bar whose search has ended."""
+    bars.update(bar, completed=1)
