@@ -9,16 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Literal
 
 from hil.errors import RigFault
 from hil.rows import sample_row
 from hil.wire import bringup
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from hil.clocks import CameraClock
     from hil.config.scenario import Scenario
     from hil.estimator.odometry import BelievedGeometry
@@ -26,8 +23,9 @@ if TYPE_CHECKING:
     from hil.record.timeline import Timeline
     from hil.references import Reference
     from hil.targets.base import Frame, Rig
-    from hil.types import Estimate, Estimator, OuterCommand, OuterLaw, Pose, PoseMeasurement
+    from hil.types import Estimate, Estimator, OuterCommand, OuterLaw, PoseMeasurement
     from hil.wire.link import BoardLink, WheelReport
+    from vision.tracker import Localiser
 
 # Poses and time exchanges wanted before the start; both ties are then good to a few ms.
 _POSES_WANTED = 15
@@ -45,18 +43,9 @@ Progress = Callable[[float], None]
 Publish = Callable[[float, "Estimate", bool], None]
 
 
-class Localiser(Protocol):
-    """Finds the robot in a frame; stateless, the prediction is passed in."""
-
-    def locate(
-        self, image_bgr: NDArray[np.uint8], predicted: Pose | None, search_radius_m: float
-    ) -> PoseMeasurement:
-        """Return the pose seen, or the reason why it was not."""
-
-
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What a session is made of; `dialect_hash` is the host's own."""
+    """What a session is made of."""
 
     rig: Rig
     link: BoardLink

@@ -109,7 +109,9 @@ def test_search_bounds_are_valid_gains(outer):
     """Both corners of the search box pass the bounds of the configuration."""
     size = len(SEARCH[outer])
     for corner in (0.0, 1.0):
-        with_values(BASE, outer, decode(SEARCH[outer], [corner] * size))
+        values = decode(SEARCH[outer], [corner] * size)
+        gains = with_values(BASE, outer, values).model_dump()[outer.replace("-", "_")]
+        assert {name: gains[name] for name in values} == values
 
 
 def test_cases_are_scenarios_calm_pushed_and_late():
