@@ -45,6 +45,12 @@ void bind_names(nb::module_& m) {
                             "charge_ratio"});
 }
 
+twin::Drive duty(double left, double right) {
+  twin::Drive drive;
+  drive.duty = twin::Pair{left, right};
+  return drive;
+}
+
 void bind_plant(nb::module_& m) {
   nb::class_<PlantParams>(m, "PlantParams")
       .def(nb::init<>())
@@ -65,22 +71,22 @@ void bind_plant(nb::module_& m) {
           [](Plant& p, const StateVector& x) { p.state() = x; })
       .def("step",
            [](Plant& p, double h_s, double left, double right, const LoadVector& loads) {
-             p.step(h_s, {left, right}, loads, loads, loads);
+             p.step(h_s, duty(left, right), loads, loads, loads);
            },
            "h_s"_a, "duty_left"_a, "duty_right"_a, "loads"_a)
       .def("run",
            [](Plant& p, std::int64_t steps, double h_s, double left, double right,
               const LoadVector& loads) {
-             for (std::int64_t i = 0; i < steps; ++i) p.step(h_s, {left, right}, loads, loads, loads);
+             for (std::int64_t i = 0; i < steps; ++i) p.step(h_s, duty(left, right), loads, loads, loads);
            },
            "steps"_a, "h_s"_a, "duty_left"_a, "duty_right"_a, "loads"_a)
       .def("derivative",
            [](const Plant& p, double left, double right, const LoadVector& loads) {
-             return p.derivative(p.state(), {left, right}, loads);
+             return p.derivative(p.state(), duty(left, right), loads);
            },
            "duty_left"_a, "duty_right"_a, "loads"_a)
       .def("battery_v",
-           [](const Plant& p, double left, double right) { return p.battery_v({left, right}, 0.0); },
+           [](const Plant& p, double left, double right) { return p.battery_v(duty(left, right), 0.0); },
            "duty_left"_a, "duty_right"_a);
 }
 

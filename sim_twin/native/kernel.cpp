@@ -102,11 +102,11 @@ void Kernel::follow_reset_line() {
 }
 
 void Kernel::set_drive() {
-  const int other = fault_.motors_exchanged ? 1 : 0;
-  drive_.duty_left = board_->duty(other) * (fault_.side[0].reversed ? -1.0 : 1.0);
-  drive_.duty_right = board_->duty(1 - other) * (fault_.side[1].reversed ? -1.0 : 1.0);
-  drive_.jam_left = fault_.side[0].stuck ? kJam_n_m_s_rad : 0.0;
-  drive_.jam_right = fault_.side[1].stuck ? kJam_n_m_s_rad : 0.0;
+  for (int side = 0; side < 2; ++side) {
+    const int channel = fault_.motors_exchanged ? 1 - side : side;
+    drive_.duty[side] = board_->duty(channel) * (fault_.side[side].reversed ? -1.0 : 1.0);
+    drive_.jam[side] = fault_.side[side].stuck ? kJam_n_m_s_rad : 0.0;
+  }
 }
 
 void Kernel::integrate() {

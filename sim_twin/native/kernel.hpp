@@ -66,7 +66,7 @@ class Kernel {
   PoseSample pose_at(double t_us) const;
   const StateVector& state() const { return plant_.state(); }
   double battery_v() const { return battery_v_; }
-  double duty(int side) const { return side == 0 ? drive_.duty_left : drive_.duty_right; }
+  double duty(int side) const { return drive_.duty[side]; }
   std::int64_t true_count(int side) const { return encoders_[side].true_count(); }
 
  private:

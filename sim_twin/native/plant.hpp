@@ -5,7 +5,13 @@
 
 #include <array>
 
+#include "pair.hpp"
+
 namespace twin {
+
+// What one step calls four times: a chain of results that wait for each other, which a call's way
+// through memory makes a tenth longer.
+#define TWIN_INLINE [[gnu::always_inline]] inline
 
 // One list: C++ fields, their Python names, and what a caller must set (no defaults).
 #define TWIN_PLANT_PARAMETERS(X)                                                              \
@@ -41,6 +47,17 @@ enum State : int {
 };
 using StateVector = std::array<double, kStates>;
 
+// The same states two by two, as the integration works on them.
+enum PairIndex : int {
+  kPosition,  // X, Y
+  kTurn,      // theta, theta_dot
+  kEta,       // eta1, eta2
+  kCurrent, kWheel, kOmega,  // left, right
+  kBattery,   // charge, nothing
+  kPairs
+};
+using PairedState = std::array<Pair, kPairs>;
+
 // What acts on the robot from outside besides the bridge, with the scenario's name for it
 // (hil.config.events.Target). Accelerations add to eta1_dot, eta2_dot and theta_ddot; forces and
 // the torque act at the centre of mass in the body frame; wheel loads oppose forward when positive;
@@ -66,9 +83,9 @@ enum Load : int {
 };
 using LoadVector = std::array<double, kLoads>;
 
-struct Drive {
-  double duty_left = 0.0, duty_right = 0.0;    // -1..1, held over a step
-  double jam_left = 0.0, jam_right = 0.0;      // N m s/rad, gear jam as a stiff damper
+struct Drive {  // left, right; held over a step
+  Pair duty = {0.0, 0.0};  // -1..1
+  Pair jam = {0.0, 0.0};   // N m s/rad, gear jam as a stiff damper
 };
 
 class Plant {
@@ -88,13 +105,17 @@ class Plant {
   StateVector derivative(const StateVector& x, const Drive& drive, const LoadVector& load) const;
 
  private:
-  struct SideForces {
-    double current_dot;   // A/s, one motor
-    double torque_n_m;    // all motors of the side at the wheels, friction and load taken off
-    double rolling_sign;  // smoothed sign of the rim speed
+  struct Sides {        // left, right
+    Pair current_dot;   // A/s, one motor
+    Pair torque_n_m;    // all motors of the side at the wheels, friction and load taken off
+    Pair rolling_sign;  // smoothed sign of the rim speed
   };
-  SideForces side(double current_a, double omega_rad_s, double duty, double jam, double load_n_m,
-                  double battery_v) const;
+  struct Acceleration {
+    double eta1_dot, eta2_dot, theta_ddot;  // m/s^2, m/s^2, rad/s^2, body frame
+    Pair omega_dot;                         // rad/s^2
+  };
+  TWIN_INLINE Sides sides(Pair current_a, Pair omega_rad_s, const Drive& drive, Pair load_n_m,
+                          double battery_v) const;
   // Quotients that do not change, because a division costs as much as ten products.
   struct Derived {
     double per_radius, per_inductance, per_stribeck, per_charge;
@@ -106,15 +127,23 @@ class Plant {
     double per_mass_rim, per_inertia_rim; // 1 / (m + rims), 1 / (I + m d0^2 + rims): (S'MS)^-1
   };
 
+  struct Heading {
+    double cos, sin;
+  };
+
   static Derived derive(const PlantParams& p);
-  double battery_v(const StateVector& x, const Drive& drive, double sag_v) const;
-  double draw_a(const StateVector& x, const Drive& drive) const;  // from the battery
-  void constrained(const StateVector& x, const SideForces* sides, const LoadVector& load,
-                   const double* gravity, StateVector& dx) const;
-  void slipping(const StateVector& x, const SideForces* sides, const LoadVector& load,
-                const double* gravity, StateVector& dx) const;
-  void hanging(const SideForces* sides, StateVector& dx) const;
-  void apply_constraint(StateVector& x) const;
+  static Heading heading(double theta_rad);
+  static Heading turned(const Heading& from, double by_rad);
+  double battery_v(double charge_ratio, double draw_a, double sag_v) const;
+  double draw_a(Pair current_a, const Drive& drive) const;  // from the battery
+  TWIN_INLINE PairedState derivative(const PairedState& x, const Heading& at, const Drive& drive,
+                                     const LoadVector& load) const;
+  TWIN_INLINE Acceleration constrained(const PairedState& x, const Sides& both,
+                                       const LoadVector& load, const double* gravity) const;
+  Acceleration slipping(const PairedState& x, const Sides& both, const LoadVector& load,
+                        const double* gravity) const;
+  Acceleration hanging(const Sides& both) const;
+  Pair rolling(double eta1, double w) const;  // wheel speeds, or their rates from the body's
 
   PlantParams p_;
   Derived d_;
