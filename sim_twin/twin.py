@@ -141,8 +141,8 @@ class Twin:
             return None
         exposure, poses = self._exposed.popleft()
         if self._maker is None:
-            middle = poses[len(poses) // 2] if poses else None
-            return Frame(exposure.index, exposure.t_cam_s, None, self._drawn.measure(middle))
+            measured = self._drawn.measure(poses[0] if poses else None)
+            return Frame(exposure.index, exposure.t_cam_s, None, measured)
         return Frame(exposure.index, exposure.t_cam_s, self._maker.make(exposure.index, poses))
 
     def truth(self) -> Truth:
@@ -201,10 +201,15 @@ class Twin:
         return self._kernel.pose_at(min(max(t_us, 0.0), self._kernel.time_us))
 
     def _poses_over(self, exposure: Exposure) -> tuple[PoseTuple, ...]:
-        """Return the robot's poses from start to end of the exposure; none while it is hidden."""
+        """Return the robot's poses from start to end of the exposure; none while it is hidden.
+
+        Where no image is drawn it is the one pose at the middle.
+        """
         for start_s, end_s in self._occlusions:
             if start_s <= exposure.start_s < end_s:
                 return ()
+        if self._maker is None:
+            return (self._pose_at(0.5 * (exposure.start_s + exposure.end_s)),)
         step_s = (exposure.end_s - exposure.start_s) / (POSES_PER_EXPOSURE - 1)
         return tuple(
             self._pose_at(exposure.start_s + i * step_s) for i in range(POSES_PER_EXPOSURE)
