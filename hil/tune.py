@@ -1,8 +1,9 @@
 """The gain procedure: one search, one cost and one budget for both outer laws (docs/control.md).
 
-The caller says how a candidate is run (`evaluate`), so the procedure works on any target. Gains are
+The caller says how runs are made (`evaluate`), so the procedure works on any target. Gains are
 searched on a logarithmic scale by CMA-ES; every candidate of both laws sees the same cases and
-the same seeds, and both laws get the same population and the same number of candidates.
+the same seeds, and both laws get the same population and the same number of candidates. What was found
+is judged on seeds that no candidate has seen (`judge`), pair by pair.
 """
 
 from __future__ import annotations
@@ -11,29 +12,31 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from hil.config.control import Gains
 from hil.config.events import Disturbance
 from hil.config.load import load_scenario
+from hil.stats import Paired, paired
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
 
 Figures = Mapping[str, float]
-# (outer law, gains, case, seed) -> figures of the run, named as in metrics.json
-Evaluate = Callable[[str, Gains, "Case", int], Figures]
-# (outer law, candidates done, candidates in all, best cost so far)
-Progress = Callable[[str, int, int, float], None]
+# Figures of each run, in the order of the trials, named as in metrics.json; empty for a failed run.
+Evaluate = Callable[[Sequence["Trial"]], Sequence[Figures]]
+# (candidates done, best cost so far)
+Progress = Callable[[int, float], None]
 # name -> (least, start, largest) of what is searched, on a logarithmic scale
 Box = Mapping[str, tuple[float, float, float]]
 
-# A run's cost is the sum of weight * figure: error and time to come within 20 mm, and the variation of
-# the commands (chatter) at about a tenth of the whole in a calm run. ITAE would do worse here: by its
-# weight of time it ranks candidates by where within the millimetres of the control stop they rest.
+# A run's cost is the sum of weight * figure: error, time to come within 20 mm, where it rests (1 mm is
+# worth half a second of settling), and the variation of the commands (chatter) at about a tenth of the
+# whole in a calm run. ITAE in place of IAE would weigh the rest error by chance of the duration.
 COST_WEIGHTS = {
     "iae_m_s": 1.0,
     "settling_20mm_s": 0.1,
+    "delta1_worst_last_second_m": 50.0,
     "eta1_variation_m_s": 0.2,
     "theta_dot_variation_rad_s": 0.02,
 }
@@ -101,12 +104,21 @@ CASES = (
 )
 
 
+class Trial(NamedTuple):
+    """One run of a candidate."""
+
+    outer: str
+    gains: Gains
+    case: Case
+    seed: int
+
+
 @dataclass(frozen=True, slots=True)
 class Plan:
     """What both laws are given alike."""
 
     cases: tuple[Case, ...] = CASES
-    seeds: tuple[int, ...] = (1,)
+    seeds: tuple[int, ...] = (1, 2)
     candidates: int = 300
     population: int = 10
     search_seed: int = 1
@@ -128,12 +140,19 @@ def run_cost(figures: Figures) -> float:
     return min(cost, COST_FAILED) if math.isfinite(cost) else COST_FAILED
 
 
-def candidate_cost(outer: str, gains: Gains, evaluate: Evaluate, plan: Plan) -> float:
-    """Return the mean cost over every case and seed of the plan."""
-    costs = [
-        run_cost(evaluate(outer, gains, case, seed)) for case in plan.cases for seed in plan.seeds
+def candidate_costs(
+    outer: str, candidates: Sequence[Gains], evaluate: Evaluate, plan: Plan
+) -> list[float]:
+    """Return each candidate's mean cost over every case and seed of the plan."""
+    trials = [
+        Trial(outer, gains, case, seed)
+        for gains in candidates
+        for case in plan.cases
+        for seed in plan.seeds
     ]
-    return sum(costs) / len(costs)
+    costs = [run_cost(figures) for figures in evaluate(trials)]
+    each = len(plan.cases) * len(plan.seeds)
+    return [sum(costs[i : i + each]) / each for i in range(0, len(costs), each)]
 
 
 def decode(box: Box, point: Sequence[float]) -> dict[str, float]:
@@ -154,16 +173,16 @@ def with_values(base: Gains, outer: str, values: Mapping[str, float]) -> Gains:
 
 def minimise(
     box: Box,
-    cost: Callable[[dict[str, float]], float],
+    costs_of: Callable[[Sequence[dict[str, float]]], Sequence[float]],
     *,
     candidates: int,
     population: int,
     seed: int,
-    progress: Callable[[int, float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Found:
     """Return the values of least cost among the candidates; deterministic by its seed.
 
-    `progress` is told the candidates done and the best cost so far.
+    `costs_of` is given a whole population at a time, so that it may run them side by side.
     """
     import cma  # noqa: PLC0415 - slow import, needed by this function alone
 
@@ -171,20 +190,18 @@ def minimise(
     options = {"bounds": [0.0, 1.0], "popsize": population, "seed": seed, "verbose": -9}
     strategy = cma.CMAEvolutionStrategy(start, 0.15, options)
     values = decode(box, start)
-    start_cost = cost(values)
+    (start_cost,) = costs_of([values])
     best = (start_cost, values)
     done = 1
     while done + population <= candidates:
         points = strategy.ask()
-        costs = []
-        for point in points:
-            values = decode(box, point)
-            costs.append(cost(values))
-            best = min(best, (costs[-1], values), key=lambda item: item[0])
-            done += 1
-            if progress is not None:
-                progress(done, best[0])
-        strategy.tell(points, costs)
+        tried = [decode(box, point) for point in points]
+        costs = costs_of(tried)
+        best = min([best, *zip(costs, tried, strict=True)], key=lambda item: item[0])
+        done += population
+        if progress is not None:
+            progress(done, best[0])
+        strategy.tell(points, list(costs))
     return Found(best[1], best[0], start_cost, done)
 
 
@@ -192,19 +209,95 @@ def search(
     outer: str, base: Gains, evaluate: Evaluate, plan: Plan, progress: Progress | None = None
 ) -> Found:
     """Return the best gains of `outer` within the plan's budget; deterministic by its seeds."""
-
-    def told(done: int, best: float) -> None:
-        if progress is not None:
-            progress(outer, done, plan.candidates, best)
-
     return minimise(
         SEARCH[outer],
-        lambda values: candidate_cost(outer, with_values(base, outer, values), evaluate, plan),
+        lambda tried: candidate_costs(
+            outer, [with_values(base, outer, values) for values in tried], evaluate, plan
+        ),
         candidates=plan.candidates,
         population=plan.population,
         seed=plan.search_seed,
-        progress=told,
+        progress=progress,
     )
+
+
+# The tape that judges: the scenarios as they ship, with seeds that no search uses.
+HELD_OUT_SCENARIOS = ("scenario-1", "scenario-2", "scenario-3")
+HELD_OUT_SEED = 1000
+ALL_SCENARIOS = "all"
+JUDGED = (
+    "cost",
+    "ise_m2_s",
+    "itae_m_s2",
+    "settling_20mm_s",
+    "delta1_worst_last_second_m",
+    "control_energy_m2_s3",
+    "theta_dot_variation_rad_s",
+    "pwm_variation_counts",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """ASG-ISM - PID on held-out seeds: by scenario (and over all of them), by figure.
+
+    `failed` counts each law's runs without figures; their pairs cost COST_FAILED and are left out
+    of the other figures.
+    """
+
+    seeds: tuple[int, ...]
+    differences: dict[str, dict[str, Paired]]
+    failed: dict[str, int]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the verdict for a JSON document."""
+        return {
+            "seeds": list(self.seeds),
+            "failed": self.failed,
+            "asg-ism - pid": {
+                scenario: {name: result.to_json() for name, result in table.items()}
+                for scenario, table in self.differences.items()
+            },
+        }
+
+
+def held_out_trials(gains: Gains, repeats: int) -> list[Trial]:
+    """Return the runs of the held-out tape, both laws with equal seeds."""
+    return [
+        Trial(outer, gains, Case(scenario, "calm", "asg-ism"), seed)
+        for seed in range(HELD_OUT_SEED, HELD_OUT_SEED + repeats)
+        for scenario in HELD_OUT_SCENARIOS
+        for outer in SEARCH
+    ]
+
+
+def judge(trials: Sequence[Trial], figures: Sequence[Figures]) -> Verdict:
+    """Return the verdict on the runs of a held-out tape."""
+    values: dict[str, dict[str, dict[str, list[float]]]] = {
+        scenario: {name: {outer: [] for outer in SEARCH} for name in JUDGED}
+        for scenario in (ALL_SCENARIOS, *HELD_OUT_SCENARIOS)
+    }
+    for trial, found in zip(trials, figures, strict=True):
+        known = {**found, "cost": run_cost(found)}
+        for scenario in (ALL_SCENARIOS, trial.case.scenario):
+            for name in JUDGED:
+                values[scenario][name][trial.outer].append(known.get(name, math.nan))
+    return Verdict(
+        seeds=tuple(dict.fromkeys(trial.seed for trial in trials)),
+        differences={
+            scenario: {
+                name: paired(by_law["pid"], by_law["asg-ism"]) for name, by_law in table.items()
+            }
+            for scenario, table in values.items()
+        },
+        failed={
+            outer: sum(
+                not found for trial, found in zip(trials, figures, strict=True)
+                if trial.outer == outer
+            )
+            for outer in SEARCH
+        },
+    )  # fmt: skip
 
 
 def tune(
@@ -214,10 +307,9 @@ def tune(
     *,
     target: str,
     revision: str,
-    progress: Progress | None = None,
 ) -> Gains:
     """Return the tuned gains of both laws with their origin; `base` holds what is not searched."""
-    found = {outer: search(outer, base, evaluate, plan, progress) for outer in SEARCH}
+    found = {outer: search(outer, base, evaluate, plan) for outer in SEARCH}
     return with_origin(base, found, plan, target=target, revision=revision)
 
 
@@ -242,6 +334,20 @@ def with_origin(
         origin[f"cost_{outer}"] = round(result.cost, 4)
         origin[f"start_cost_{outer}"] = round(result.start_cost, 4)
     return gains.model_copy(update={"origin": origin})
+
+
+def with_verdict(gains: Gains, verdict: Verdict) -> Gains:
+    """Return the gains with what the held-out tape says of their cost in their origin."""
+    cost = verdict.differences[ALL_SCENARIOS]["cost"]
+    told: dict[str, str | int | float] = {
+        "held_out": f"{', '.join(HELD_OUT_SCENARIOS)}, seeds {verdict.seeds[0]} to "
+        f"{verdict.seeds[-1]}",
+        "held_out_cost_pid": round(cost.baseline_mean, 4),
+        "held_out_cost_asg-ism": round(cost.other_mean, 4),
+        "held_out_cost_difference": f"{cost.mean:.4f}, 95 % {cost.interval.low:.4f} to "
+        f"{cost.interval.high:.4f}",
+    }
+    return gains.model_copy(update={"origin": gains.origin | told})
 
 
 def write_gain_set(path: Path, gains: Gains) -> None:
@@ -272,22 +378,22 @@ def case_scenario(case: Case, gains: Gains) -> Scenario:
 
 @dataclass(frozen=True, slots=True)
 class OnTarget:
-    """An `Evaluate` that runs each case on a target; a run that ends early has no figures."""
+    """Makes one run of a trial on a target; a run that ends early has no figures."""
 
     target: str
     camera: str
 
-    def __call__(self, outer: str, gains: Gains, case: Case, seed: int) -> Figures:
+    def __call__(self, trial: Trial) -> Figures:
         """Return the figures of one run, which leaves no record behind."""
         from hil.run import RunSpec, execute_in_memory  # noqa: PLC0415 - the search needs no target
 
         spec = RunSpec(
-            scenario=case_scenario(case, gains),
+            scenario=case_scenario(trial.case, trial.gains),
             target=self.target,
             camera=self.camera,
-            outer=outer,
-            inner=case.inner,
-            seed=seed,
+            outer=trial.outer,
+            inner=trial.case.inner,
+            seed=trial.seed,
             out=Path(),
             command="hil tune",
         )

@@ -76,7 +76,7 @@ def tune(plan: Plan, progress: Progress) -> dict[str, Found]:
     def searched(law: str) -> Found:
         return minimise(
             SEARCH[law],
-            lambda values: bench_cost(law, values, plan.robots),
+            lambda tried: [bench_cost(law, values, plan.robots) for values in tried],
             candidates=plan.candidates,
             population=plan.population,
             seed=plan.search_seed,

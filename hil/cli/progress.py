@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
 
 Update = Callable[[str, float], None]
 
@@ -26,9 +31,8 @@ def run_progress(durations_s: Mapping[str, float]) -> Iterator[Update]:
         yield lambda name, t_s: bars.update(tasks[name], completed=t_s)
 
 
-@contextmanager
-def job_progress(name: str) -> Iterator[Callable[[int, int], None]]:
-    """Show one bar for many jobs; `update(done, total)` moves it. Nothing is shown off a terminal."""
+def _job_bars() -> Progress:
+    """Return bars for counted jobs. Nothing is shown off a terminal."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -47,6 +51,40 @@ def job_progress(name: str) -> Iterator[Callable[[int, int], None]]:
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bars:
+    return Progress(*columns, console=console, disable=not console.is_terminal)
+
+
+@contextmanager
+def job_progress(name: str) -> Iterator[Callable[[int, int], None]]:
+    """Show one bar for many jobs; `update(done, total)` moves it."""
+    with _job_bars() as bars:
         task = bars.add_task(name, total=None)
         yield lambda done, total: bars.update(task, completed=done, total=total)
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One bar of a command that goes through several stages."""
+
+    bars: Progress
+    task: TaskID
+    name: str
+
+    def advance(self) -> None:
+        """Count one job."""
+        self.bars.advance(self.task)
+
+    def best(self, _done: int, cost: float) -> None:
+        """Show the least cost so far beside the name."""
+        self.bars.update(self.task, description=f"{self.name}, best cost {cost:.4f}")
+
+
+@contextmanager
+def stage_progress() -> Iterator[Callable[[str, int], Stage]]:
+    """Show one bar after the other; `stage(name, jobs)` begins the next."""
+    with _job_bars() as bars:
+
+        def stage(name: str, jobs: int) -> Stage:
+            return Stage(bars, bars.add_task(name, total=jobs), name)
+
+        yield stage

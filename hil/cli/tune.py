@@ -2,66 +2,146 @@
 
 from __future__ import annotations
 
-from functools import partial
+import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from hil.cli.options import json_option, print_json
+
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
+    from rich.table import Table
+
+    from hil.metrics import Metric
+    from hil.stats import Paired
+    from hil.tune import Figures, Found, Trial, Verdict
 
 
 @click.command("tune")
 @click.option("--candidates", type=click.IntRange(11, 100_000), default=301, show_default=True,
-              help="Candidates for each law; each runs every case over both wheel laws.")  # fmt: skip
+              help="Candidates for each law; each runs every case with every seed.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True,
               help="Draws the candidates; the cases have seeds of their own.")  # fmt: skip
+@click.option("--held-out", "repeats", type=click.IntRange(2, 10_000), default=100,
+              show_default=True, help="Runs of each scenario and law that judge the result.")  # fmt: skip
 @click.option("--camera", type=click.Choice(["pose", "rendered"]), default="pose",
               show_default=True, help="What the twin sees with.")  # fmt: skip
+@click.option("--workers", type=click.IntRange(1, 1024),
+              help="Processes on this machine; the result is the same. [default: one a core]")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), default=Path("tuned.toml"),
               show_default=True, metavar="FILE", help="Where the gain set goes.")  # fmt: skip
-def command(candidates: int, seed: int, camera: str, out: Path) -> None:
+@json_option
+def command(
+    candidates: int,
+    seed: int,
+    repeats: int,
+    camera: str,
+    workers: int | None,
+    out: Path,
+    as_json: bool,
+) -> None:
     """Tune ASG-ISM and PID on the twin with the same budget, cases and cost (docs/control.md).
 
-    Both searches run side by side, one process each. The result is a gain set with its origin, to
-    be judged on seeds it has not seen: `hil experiment --repeats 100 --seed 1000 --camera pose`.
+    The result is a gain set with its origin. It is judged at once on a held-out tape: the three
+    scenarios with seeds no candidate has seen, both laws under the same ones.
     """
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
-
-    from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
+    from hil.cli.progress import stage_progress
     from hil.config.control import ControlConfig
     from hil.errors import BadInput
     from hil.record.manifest import git_revision
-    from hil.tune import SEARCH, OnTarget, Plan, search, with_origin, write_gain_set
+    from hil.sweep.crew import Pool
+    from hil.tune import (
+        SEARCH,
+        OnTarget,
+        Plan,
+        held_out_trials,
+        judge,
+        search,
+        with_origin,
+        with_verdict,
+        write_gain_set,
+    )
 
     if out.exists():
         raise BadInput(f"--out {out}: exists already; name a new file")
     base = ControlConfig().active_gains
     plan = Plan(candidates=candidates, search_seed=seed)
-    evaluate = OnTarget("twin", camera)
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    each = len(plan.cases) * len(plan.seeds)
     with (
-        Progress(*columns, console=Console(stderr=True)) as bars,
-        ProcessPoolExecutor(len(SEARCH), get_context("spawn")) as pool,
+        stage_progress() as stage,
+        Pool(OnTarget("twin", camera), workers or os.cpu_count() or 1) as pool,
     ):
-        runs = candidates * len(plan.cases)
-        futures = {}
+        found = {}
         for law in SEARCH:
-            bar = bars.add_task(f"{law}: {candidates} candidates, {runs} runs", total=1)
-            futures[law] = pool.submit(search, law, base, evaluate, plan)
-            futures[law].add_done_callback(partial(_finish, bars, bar))
-        found = {law: future.result() for law, future in futures.items()}
-    gains = with_origin(base, found, plan, target=f"twin, {camera} camera", revision=git_revision())
+            step = stage(f"{law}: {candidates} candidates", candidates * each)
+
+            def evaluate(trials: Sequence[Trial], step: Any = step) -> list[Figures]:
+                return pool.map(trials, step.advance)
+
+            found[law] = search(law, base, evaluate, plan, step.best)
+        gains = with_origin(
+            base, found, plan, target=f"twin, {camera} camera", revision=git_revision()
+        )
+        trials = held_out_trials(gains, repeats)
+        step = stage(f"held-out tape: {len(trials)} runs", len(trials))
+        verdict = judge(trials, pool.map(trials, step.advance))
+    gains = with_verdict(gains, verdict)
     write_gain_set(out, gains)
+    if as_json:
+        print_json({"gains": gains.model_dump(), "verdict": verdict.to_json()})
+    else:
+        _print(out, found, verdict)
+
+
+def _print(out: Path, found: dict[str, Found], verdict: Verdict) -> None:
+    """Write what was found and how it was judged to stdout."""
+    from rich.console import Console
+
+    console = Console(highlight=False)
     for law, result in found.items():
-        click.echo(f"{law}: cost {result.cost:.4f}, {result.start_cost:.4f} at the start")
-    click.echo(f"gain set: {out}")
+        console.print(f"{law}: cost {result.cost:.4f}, {result.start_cost:.4f} at the start")
+    console.print(_table(verdict))
+    for law, count in verdict.failed.items():
+        if count:
+            console.print(f"[yellow]note:[/yellow] {law}: {count} runs failed")
+    console.print(f"gain set: {out}")
 
 
-def _finish(bars: Progress, bar: TaskID, _done: Any) -> None:
-    """Fill a bar whose search has ended."""
-    bars.update(bar, completed=1)
+def _table(verdict: Verdict) -> Table:
+    """Return the paired differences, a row per figure and a column per scenario."""
+    from rich.table import Table
+
+    from hil.metrics import BY_NAME
+    from hil.tune import ALL_SCENARIOS
+
+    seeds = f"seeds {verdict.seeds[0]} to {verdict.seeds[-1]}"
+    table = Table(
+        title=f"asg-ism - pid, held-out {seeds}, 95 % intervals",
+        title_justify="left",
+        show_lines=True,
+    )
+    table.add_column("figure")
+    columns = [name for name in verdict.differences if name != ALL_SCENARIOS]
+    for name in (*columns, ALL_SCENARIOS):
+        table.add_column(name, justify="right")
+    for figure in verdict.differences[ALL_SCENARIOS]:
+        metric = BY_NAME.get(figure)
+        label = f"{metric.label}, {metric.shown_unit}" if metric else figure
+        cells = [
+            _cell(verdict.differences[name][figure], metric) for name in (*columns, ALL_SCENARIOS)
+        ]
+        table.add_row(label, *cells)
+    return table
+
+
+def _cell(result: Paired, metric: Metric | None) -> str:
+    """Return a difference above its interval; green is better, red is worse, plain is unsure."""
+
+    def text(value: float) -> str:
+        number = metric.text(abs(value), with_unit=False) if metric else f"{abs(value):.3f}"
+        return f"{'-' if value < 0 else '+'}{number}"
+
+    shown = f"{text(result.mean)}\n{text(result.interval.low)} to {text(result.interval.high)}"
+    return f"[{'green' if result.mean < 0 else 'red'}]{shown}[/]" if result.certain else shown

@@ -14,7 +14,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from hil.errors import BadInput, RigFault
 
@@ -71,6 +71,36 @@ def _hand_out(
             result = future.result()
             del running[future]
             yield result
+
+
+class Pool:
+    """Worker processes that do one list of jobs after the other and keep its order."""
+
+    def __init__(self, function: Callable[[Job], Result], workers: int) -> None:
+        self._function = function
+        context = multiprocessing.get_context("spawn")
+        self._pool = ProcessPoolExecutor(workers, context, _leave_ctrl_c_to_parent)
+
+    def __enter__(self) -> Self:
+        """Return the pool."""
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        """Give up what is not done and end the workers."""
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+    def map(self, jobs: Iterable[Job], done: Callable[[], None]) -> list[Any]:
+        """Return the results in the order of the jobs; `done` is called for each."""
+        results = []
+        try:
+            for result in self._pool.map(self._function, jobs):
+                results.append(result)
+                done()
+        except BrokenProcessPool:
+            raise RigFault(
+                "a worker process died; out of memory? fewer --workers need less"
+            ) from None
+        return results
 
 
 def _leave_ctrl_c_to_parent() -> None:

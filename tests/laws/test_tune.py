@@ -9,17 +9,23 @@ import pytest
 from hil.config.control import ControlConfig, Gains
 from hil.config.load import load_scenario
 from hil.tune import (
+    ALL_SCENARIOS,
     CASES,
     COST_FAILED,
+    COST_WEIGHTS,
+    HELD_OUT_SCENARIOS,
     PUSHES,
     SEARCH,
     Case,
     Plan,
     case_scenario,
     decode,
+    held_out_trials,
+    judge,
     run_cost,
     tune,
     with_values,
+    with_verdict,
     write_gain_set,
 )
 
@@ -35,23 +41,24 @@ def distance(outer, gains):
     return sum(math.log(values[n] / best) ** 2 for n, best in BEST.items() if n in values)
 
 
-def bowl(outer, gains, case, seed):
-    """Figures of a run whose error grows with the distance of the gains from BEST."""
-    return {
-        "iae_m_s": 1.0 + distance(outer, gains) + (case == B) + 0.1 * seed,
-        "settling_20mm_s": 0.0,
-        "eta1_variation_m_s": 0.0,
-        "theta_dot_variation_rad_s": 0.0,
-    }
+STILL = dict.fromkeys(COST_WEIGHTS, 0.0)
+
+
+def bowl(trials):
+    """Figures of runs whose error grows with the distance of the gains from BEST."""
+    return [
+        STILL | {"iae_m_s": 1.0 + distance(t.outer, t.gains) + (t.case == B) + 0.1 * t.seed}
+        for t in trials
+    ]
 
 
 @pytest.fixture(scope="module")
 def tuned():
     runs = Counter()
 
-    def counting(outer, gains, case, seed):
-        runs[outer, case, seed] += 1
-        return bowl(outer, gains, case, seed)
+    def counting(trials):
+        runs.update((t.outer, t.case, t.seed) for t in trials)
+        return bowl(trials)
 
     return tune(BASE, counting, PLAN, target="bowl", revision="none"), runs
 
@@ -87,10 +94,11 @@ def test_a_run_without_figures_costs_most():
     calm = {
         "iae_m_s": 1.5,
         "settling_20mm_s": 4.0,
+        "delta1_worst_last_second_m": 0.001,
         "eta1_variation_m_s": 0.6,
         "theta_dot_variation_rad_s": 7.0,
     }
-    assert run_cost(calm) == pytest.approx(1.5 + 0.1 * 4.0 + 0.2 * 0.6 + 0.02 * 7.0)
+    assert run_cost(calm) == pytest.approx(1.5 + 0.4 + 0.05 + 0.12 + 0.14)
     assert run_cost({}) == COST_FAILED
     assert run_cost({**calm, "settling_20mm_s": math.nan}) == COST_FAILED
     assert run_cost({**calm, "iae_m_s": 1e6}) == COST_FAILED
@@ -125,3 +133,34 @@ def test_cases_are_scenarios_calm_pushed_and_late():
         assert (scenario.camera.drop_ratio > plain.camera.drop_ratio) == (case.variant == "late")
     assert Counter(case.variant for case in CASES) == {"calm": 2, "pushed": 2, "late": 2}
     assert Counter(case.inner for case in CASES) == {"asg-ism": 3, "pid": 3}
+
+
+def test_verdict_pairs_both_laws_by_seed(tuned):
+    """ASG-ISM costs 0.3 less than PID with every seed of scenario 1 and 0.1 more in scenario 3."""
+    gains, _ = tuned
+    trials = held_out_trials(gains, 8)
+    assert {t.seed for t in trials}.isdisjoint(Plan().seeds)
+    assert Counter(t.outer for t in trials) == {"pid": 24, "asg-ism": 24}
+    gap = {"scenario-1": -0.3, "scenario-2": 0.0, "scenario-3": 0.1}
+    figures = [
+        STILL | {"iae_m_s": 0.01 * t.seed + gap[t.case.scenario] * (t.outer == "asg-ism")}
+        for t in trials
+    ]
+    verdict = judge(trials, figures)
+    for scenario in HELD_OUT_SCENARIOS:
+        result = verdict.differences[scenario]["cost"]
+        assert result.pairs == 8
+        assert result.mean == pytest.approx(gap[scenario], abs=1e-9)
+        assert result.certain == (scenario != "scenario-2")
+    assert verdict.differences[ALL_SCENARIOS]["cost"].mean == pytest.approx(-0.2 / 3)
+    assert "-0.0667" in with_verdict(gains, verdict).origin["held_out_cost_difference"]
+
+
+def test_a_failed_run_counts_in_the_verdict(tuned):
+    """A run without figures costs most in its pair and is counted, not dropped."""
+    trials = held_out_trials(tuned[0], 2)
+    broken = next(i for i, t in enumerate(trials) if t.outer == "asg-ism")
+    figures = [{} if i == broken else STILL for i in range(len(trials))]
+    verdict = judge(trials, figures)
+    assert verdict.failed == {"pid": 0, "asg-ism": 1}
+    assert verdict.differences[ALL_SCENARIOS]["cost"].mean == pytest.approx(COST_FAILED / 6)
