@@ -6,6 +6,7 @@ of the built-in robot, condition and scenario files. Neither is written down a s
 
 from __future__ import annotations
 
+import functools
 import re
 import typing
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,14 +17,18 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
+from hil._firmware import Parameter, parameter_table
+from hil.config.control import Gains
 from hil.config.load import unit_of
 from hil.config.scenario import Scenario
 
 _LINE = re.compile(r'^"?(?P<key>[\w.]+)"?\s*=\s*(?P<value>[^#]*?)\s*(?:#\s*(?P<note>.*))?$')
 _TABLE = re.compile(r"^\[(?P<table>[\w.]+)\]")
 _UNIT_FIRST = re.compile(r"^[^;:,]{1,12}; ")
-# Kept out of the table: the runs' subject, shown elsewhere, and gain sets that are not in use.
-_ELSEWHERE = ("name", "description", "requirements", "manoeuvre", "control.gains", "control.outer")
+# Kept out of the table: the runs' subject and laws, shown elsewhere, and gain sets not in use.
+_ELSEWHERE = (
+    "name", "description", "requirements", "manoeuvre", "control.gains", "control.outer", "board.LAW",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +51,43 @@ def assumptions(scenario: Mapping[str, Any]) -> list[tuple[str, list[Assumption]
             continue
         top = key.split(".")[0] if "." in key else "run"
         text = f"{value:g}" if isinstance(value, float) else str(value)
-        item = Assumption(
-            key, text, unit_of(key.split(".")[-1]), _meaning(key, scenario), sources.get(key, "")
+        unit, meaning = _told(top, key, scenario)
+        groups.setdefault(top, []).append(
+            Assumption(key, text, unit, meaning, sources.get(key, ""))
         )
-        groups.setdefault(top, []).append(item)
     return list(groups.items())
+
+
+def gain_assumptions(outer: str, values: Mapping[str, Any], source: str) -> list[Assumption]:
+    """Return the gains of one outer law as a manifest has them."""
+    model = Gains.model_fields[outer.replace("-", "_")].annotation
+    fields = model.model_fields if isinstance(model, type) and issubclass(model, BaseModel) else {}
+    return [
+        Assumption(
+            key,
+            f"{value:g}" if isinstance(value, float) else str(value),
+            unit_of(key),
+            fields[key].description or "" if key in fields else "",
+            source,
+        )
+        for key, value in values.items()
+    ]
+
+
+def _told(top: str, key: str, scenario: Mapping[str, Any]) -> tuple[str, str]:
+    """Return unit and meaning of a value."""
+    name = key.rsplit(".", maxsplit=1)[-1]
+    if top == "mismatch":
+        return "(ratio)", "true value / value the host believes"
+    if top == "board" and name in _board_parameters():
+        parameter = _board_parameters()[name]
+        return parameter.unit, parameter.doc
+    return unit_of(name), _meaning(key, scenario)
+
+
+@functools.cache
+def _board_parameters() -> dict[str, Parameter]:
+    return {parameter.name: parameter for parameter in parameter_table()}
 
 
 def _leaves(tree: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:

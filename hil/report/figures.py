@@ -252,8 +252,15 @@ def _pair_figure(
     return sheet.svg(name)
 
 
+# ||s|| starts at zero, which a logarithmic axis cannot show; less than this is noise.
+_S_FLOOR_M_S2 = 1e-3
+
+
 def sliding_figure(runs: Sequence[Trace], name: str) -> str | None:
-    """Draw ||s|| against its layer eps; None when no run has a sliding variable."""
+    """Draw ||s|| against its layer eps; None when no run has a sliding variable.
+
+    Logarithmic: the layer may shrink by two decades, and ||s|| lies far inside it at first.
+    """
     sliding = [run for run in runs if np.isfinite(run.samples["s_x_m_s2"]).any()]
     if not sliding:
         return None
@@ -265,7 +272,8 @@ def sliding_figure(runs: Sequence[Trace], name: str) -> str | None:
         axes.plot(t_s, s_norm, color=run.paint, lw=1.0, label=f"‖s‖, {run.label}")
         axes.plot(t_s, eps, color=INK, lw=0.8, ls=":", label=f"layer ε, {run.label}")
     sheet.label(0, "‖s‖ in m/s²")
-    axes.set_ylim(0.0, None)
+    axes.set_yscale("log")
+    axes.set_ylim(_S_FLOOR_M_S2, None)
     return sheet.svg(name)
 
 

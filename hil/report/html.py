@@ -17,7 +17,7 @@ from hil.errors import BadInput
 from hil.metrics import BY_NAME, METRICS
 from hil.record.manifest import replace_file
 from hil.report import figures as draw
-from hil.report.assumptions import Assumption, assumptions
+from hil.report.assumptions import Assumption, assumptions, gain_assumptions
 from hil.report.compare import HEADLINES, Comparison, Entry, better_of, findings
 from hil.report.repeats_html import repeats_context
 
@@ -337,29 +337,28 @@ def _grouped(
 
 
 def _gains(comparisons: Sequence[Comparison]) -> list[tuple[str, list[Assumption]]]:
-    """Return the gains that each law ran with, as the manifests have them."""
+    """Return the gains that each outer law ran with, as the manifests have them."""
     groups: dict[str, list[Assumption]] = {}
     for entry in _entries(comparisons):
         manifest = entry.run.manifest
         origin = f"set {manifest.gains.get('set', 'unnamed')}"
-        for key, value in manifest.gains.items():
-            if isinstance(value, dict):
-                name = manifest.outer if key == "outer" else key
-                groups.setdefault(
-                    f"{name}, {origin}",
-                    [Assumption(k, f"{v:g}" if isinstance(v, float) else str(v), "", "", origin)
-                     for k, v in value.items()],
-                )  # fmt: skip
+        values = manifest.gains.get("outer")
+        if isinstance(values, dict):
+            items = gain_assumptions(manifest.outer, values, origin)
+            groups.setdefault(f"{manifest.outer}, {origin}", items)
     return list(groups.items())
+
+
+_PROVENANCE = {"inner": "wheel law, on the board"}
 
 
 def _provenance(comparisons: Sequence[Comparison]) -> list[tuple[str, str]]:
     """Return what made the runs; a value that differs between them is listed as it differs."""
     manifests = [entry.run.manifest for entry in _entries(comparisons)]
     rows = []
-    for key in ("git_revision", "dialect_hash", "parameter_hash", "firmware_build_id"):
+    for key in ("inner", "git_revision", "dialect_hash", "parameter_hash", "firmware_build_id"):
         found = dict.fromkeys(str(getattr(manifest, key)) or "unknown" for manifest in manifests)
-        rows.append((key.replace("_", " "), ", ".join(found)))
+        rows.append((_PROVENANCE.get(key, key.replace("_", " ")), ", ".join(found)))
     versions = manifests[0].versions
     rows += [(name, text) for name, text in versions.items()]
     return rows

@@ -12,9 +12,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from hil.config.load import load_scenario
 from hil.errors import BadInput
 from hil.metrics import METRICS
-from hil.report.assumptions import assumptions
+from hil.report.assumptions import assumptions, gain_assumptions
 from hil.report.circle import CircleStudy
 from hil.report.compare import compare_runs
 from hil.report.html import render, write_report
@@ -174,8 +175,20 @@ def test_assumptions_carry_unit_meaning_and_source():
     assert (radius.value, radius.unit) == ("0.0482", "m")
     assert radius.meaning
     assert "table 8.3" in radius.source
-    assert (
-        "30:1" in items["robot.motor.gear_ratio"].source or items["robot.motor.gear_ratio"].source
-    )
+    assert items["robot.motor.gear_ratio"].source == "motor sheet"
     assert "disturbances.0.start_s" in items
     assert not any(key.startswith("control.gains") for key in items)
+
+
+def test_every_value_of_a_shipped_scenario_says_what_it_means():
+    """No row of the table stands there as a bare number: mismatch, board and gains included."""
+    tree = load_scenario("scenario-1").model_dump(mode="json")
+    items = {item.key: item for _, group in assumptions(tree) for item in group}
+    kinds = {"reference.kind", "robot.name", "robot.variant"}
+    assert [key for key, item in items.items() if not item.meaning and key not in kinds] == []
+    mismatch = items["mismatch.mass_kg"]
+    assert (mismatch.unit, mismatch.value) == ("(ratio)", "1.1")
+    assert items["board.ISM_K0"].unit == "duty"
+    gains = gain_assumptions("asg-ism", tree["control"]["gains"]["tuned"]["asg_ism"], "set tuned")
+    assert all(item.meaning and item.source == "set tuned" for item in gains)
+    assert {item.key: item.unit for item in gains}["mu0_s"] == "s"
