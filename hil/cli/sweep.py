@@ -11,7 +11,7 @@ from hil.cli.options import json_option, print_json
 
 
 @click.command("sweep")
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file")
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
               help="Folder for the results; that of the same campaign goes on where it stopped. "
               "[default: a new one in runs/]")  # fmt: skip
@@ -20,9 +20,9 @@ from hil.cli.options import json_option, print_json
 @click.option("--dask", metavar="ADDRESS", help="Dask scheduler to use instead of own processes.")
 @json_option
 def command(
-    file: Path, out: Path | None, workers: int | None, dask: str | None, as_json: bool
+    file: str, out: Path | None, workers: int | None, dask: str | None, as_json: bool
 ) -> int:
-    """Run the campaign of FILE (TOML) and draw what depends on what.
+    """Run the campaign of FILE (TOML, or built in: limits, layer) and draw what depends on what.
 
     Every combination of the values in [grid] and [[together]], `draws` draws of [random], `seeds`
     seeds and all laws; runs are kept in memory, one row each goes to results.parquet.

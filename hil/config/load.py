@@ -41,7 +41,7 @@ def unit_of(key: str) -> str:
 
 
 def builtin_names(kind: str) -> list[str]:
-    """Return the names of the built-in files of one kind: "scenarios", "labs", "robots" or "decks"."""
+    """Return the names of the built-in files of one kind, such as "scenarios" or "robots"."""
     folder = files("hil") / "data" / kind
     if not folder.is_dir():
         return []
@@ -171,9 +171,9 @@ def set_value(tree: Tree, text: str) -> None:
 
 def put_value(tree: Tree, key: str, value: Any) -> None:
     """Put a value where the dotted name says, in place; an unknown one is a BadInput."""
-    names = dotted_names(tree)
     parent, leaf = _find(tree, key)
     if parent is None:
+        names = dotted_names(tree)
         near = difflib.get_close_matches(key, names, n=3, cutoff=0.5)
         same_end = [
             name for name in names if name.split(".")[-1] == key.rsplit(".", maxsplit=1)[-1]

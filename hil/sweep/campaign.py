@@ -7,7 +7,6 @@ import hashlib
 import itertools
 import json
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +17,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from hil.config.base import Section
 from hil.config.control import OuterLawName
-from hil.config.load import build, check_board, load_scenario, put_value
+from hil.config.load import build, check_board, load_scenario, put_value, read_tree
 from hil.config.scenario import Scenario
 from hil.errors import BadInput
 from hil.metrics import require_known
@@ -189,14 +188,10 @@ class Campaign:
         return scenario
 
 
-def load_campaign(path: Path) -> Campaign:
-    """Return the campaign of a file, every varied value checked one by one; raises BadInput."""
-    try:
-        tree = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(f"campaign {path}: cannot be read: {error}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise BadInput(f"{path}: not valid TOML: {error}") from None
+def load_campaign(name_or_path: str) -> Campaign:
+    """Return a built-in campaign or that of a file, every varied value checked; raises BadInput."""
+    path = Path(name_or_path)
+    tree = read_tree(name_or_path, "campaigns")
     for table in ("grid", "random"):
         if isinstance(tree.get(table), Mapping):
             tree[table] = _flat(tree[table])

@@ -9,6 +9,7 @@ from random import Random
 
 import pytest
 
+from hil.config.load import builtin_names
 from hil.errors import BadInput
 from hil.sweep.campaign import Campaign, Distribution, Range, load_campaign
 
@@ -16,7 +17,7 @@ from hil.sweep.campaign import Campaign, Distribution, Range, load_campaign
 def campaign(folder: Path, text: str) -> Campaign:
     path = folder / "campaign.toml"
     path.write_text(f'scenario = "scenario-1"\n{text}', encoding="utf-8")
-    return load_campaign(path)
+    return load_campaign(str(path))
 
 
 def test_runs_are_the_product_of_grid_lists_draws_seeds_and_laws(tmp_path: Path) -> None:
@@ -91,3 +92,10 @@ def test_mistakes_are_named(tmp_path: Path, text: str, said: str) -> None:
         campaign(tmp_path, text)
     assert said in str(refusal.value)
     assert "\n" not in str(refusal.value)
+
+
+def test_built_in_campaigns_are_sound():
+    """Every campaign that ships loads, and the large one has the runs its text promises."""
+    found = {name: load_campaign(name) for name in builtin_names("campaigns")}
+    assert len(found["limits"].jobs()) == 10_000
+    assert all(campaign.file.name == name for name, campaign in found.items())

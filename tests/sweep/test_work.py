@@ -35,7 +35,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     """16 runs of 0.6 s."""
     path = tmp_path_factory.mktemp("sweep") / "delays.toml"
     path.write_text(TEXT, encoding="utf-8")
-    return load_campaign(path)
+    return load_campaign(str(path))
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +114,7 @@ def test_other_folder_is_left_alone(campaign: Campaign, finished: Path, tmp_path
     path = tmp_path / "other.toml"
     path.write_text(TEXT.replace("0.05]", "0.06]", 1), encoding="utf-8")
     with pytest.raises(BadInput, match="another campaign"):
-        ResultStore(finished, load_campaign(path))
+        ResultStore(finished, load_campaign(str(path)))
     (tmp_path / "own").mkdir()
     (tmp_path / "own" / "letter.txt").write_text("dear", encoding="utf-8")
     with pytest.raises(BadInput, match="neither empty nor a campaign"):
