@@ -29,7 +29,7 @@ State = Literal["ok", "missing", "note"]
 
 _DISTRIBUTION = "skid-steer-hil"
 _SOURCE_ROOT = Path(__file__).resolve().parents[1]
-_NATIVE = ("hil._firmware", "sim_twin._native")
+_NATIVE = ("hil._firmware", "hil.estimator._fused", "sim_twin._native")
 _ARDUINO_CORE = Path("/usr/share/arduino/hardware/arduino/avr")
 _APT = "Debian: apt install {}"
 

@@ -18,7 +18,7 @@ from hil.wire import bringup
 if TYPE_CHECKING:
     from hil.clocks import CameraClock
     from hil.config.scenario import Scenario
-    from hil.estimator.odometry import BelievedGeometry
+    from hil.estimator.geometry import BelievedGeometry
     from hil.record.memory import RunSink
     from hil.record.timeline import Timeline
     from hil.references import Reference

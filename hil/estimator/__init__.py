@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from hil.errors import BadInput
-from hil.estimator.odometry import BelievedGeometry
+from hil.estimator.geometry import BelievedGeometry
 
 if TYPE_CHECKING:
     from hil.config.control import EstimatorConfig

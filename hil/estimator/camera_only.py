@@ -15,7 +15,7 @@ from hil.types import Estimate, Pose, PoseMeasurement, WheelSample, wrap_pi
 
 if TYPE_CHECKING:
     from hil.config.control import EstimatorConfig
-    from hil.estimator.odometry import BelievedGeometry
+    from hil.estimator.geometry import BelievedGeometry
 
 # After a longer gap between poses the differentiators start anew.
 _GAP_S = 0.5

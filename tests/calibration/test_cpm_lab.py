@@ -17,7 +17,7 @@ import pytest
 
 from hil.config.control import EstimatorConfig
 from hil.estimator.camera_only import CameraOnly
-from hil.estimator.odometry import BelievedGeometry
+from hil.estimator.geometry import BelievedGeometry
 from hil.types import PoseMeasurement
 from vision.calibration.floor import FloorOptions, calibrate_floor
 from vision.calibration.points import PointPairs

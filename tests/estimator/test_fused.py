@@ -123,6 +123,26 @@ def test_an_implausible_pose_is_gated_and_changes_nothing():
     assert after.z1_m == pytest.approx(before.z1_m, abs=1e-3)
 
 
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_a_pose_without_a_number_is_gated(bad):
+    """Whichever of X, Y, theta it is, nothing of it reaches the estimate."""
+    estimator, world = make()
+    world.run(1.0, weave)
+    for k, pose in enumerate((Pose(bad, 0.0, 0.0), Pose(0.0, bad, 0.0), Pose(0.0, 0.0, bad))):
+        estimator.on_pose(world.t - 0.005 + 0.001 * k, PoseMeasurement(pose, 1.0))
+    assert estimator.gated_total == 3
+    assert math.isfinite(sum(estimator.estimate_at(world.t).z1_m))
+    late = world.run(1.0, weave)
+    assert position_errors(late)[-1] < 0.005
+
+
+def test_a_count_beyond_32_bits_is_refused():
+    """The board's counters are int32: a value that none can have is the caller's mistake."""
+    estimator, _ = make()
+    with pytest.raises(TypeError):
+        estimator.on_wheels(WheelSample(0.0, 1 << 31, 0, 0.0, 0.0))
+
+
 def test_a_moved_robot_is_found_again():
     """Lifted and put down 0.3 m away: after five agreeing poses the estimate is there."""
     estimator, world = make()

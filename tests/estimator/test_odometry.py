@@ -4,12 +4,8 @@ import math
 
 import pytest
 
-from hil.estimator.odometry import (
-    BelievedGeometry,
-    CommandHistory,
-    WheelSpeeds,
-    counts_between,
-)
+from hil.estimator import BelievedGeometry
+from hil.estimator._fused import CommandHistory, Geometry, WheelSpeeds, counts_between
 
 ROBOT = BelievedGeometry(0.05, 0.2, 0.03, 1920)
 
@@ -23,6 +19,15 @@ def test_signs_and_units_of_the_wheel_map():
     assert ROBOT.wheels(0.1, 1.0) == pytest.approx((0.0, 4.0))
     assert ROBOT.body(0.0, 4.0) == pytest.approx((0.1, 1.0))
     assert ROBOT.rad_per_count == pytest.approx(2 * math.pi / 1920)
+
+
+@pytest.mark.parametrize("wheels", [(0.0, 4.0), (-1.3, 0.7), (1e-9, -3e5)])
+def test_host_and_estimator_believe_the_same_geometry(wheels):
+    """The map to the body is written in Python and in C++: both give the same bits."""
+    native = Geometry(
+        ROBOT.wheel_radius_m, ROBOT.track_width_m, ROBOT.d0_m, rad_per_count=ROBOT.rad_per_count
+    )
+    assert native.body(*wheels) == ROBOT.body(*wheels)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +68,7 @@ def test_speed_from_counts_settles_below_the_quantisation():
         turned = (new - counts) * ROBOT.rad_per_count
         counts = new
         speeds.step(0.02, (turned, turned), [(0.02, 3.21, 3.21)])
-        errors.append(speeds.omega[0] - 3.21)
+        errors.append(speeds.omega_rad_s[0] - 3.21)
     late = errors[50:]
     assert math.sqrt(sum(e * e for e in late) / len(late)) < 0.1
 
@@ -73,5 +78,5 @@ def test_speed_follows_a_wheel_that_does_not_obey():
     speeds = make_speeds()
     for _ in range(50):
         speeds.step(0.02, (0.0, 0.0), [(0.02, 5.0, 5.0)])
-    assert abs(speeds.omega[0]) < 0.01
+    assert abs(speeds.omega_rad_s[0]) < 0.01
     assert abs(speeds.ahead([(0.06, 5.0, 5.0)])[2]) < 0.01

@@ -1,0 +1,198 @@
+#include "fused.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace estimator {
+namespace {
+
+// A wheel never turns this fast: a larger step of the counter is a restarted board.
+constexpr double kOmegaImpossible_rad_s = 200.0;
+// Without reports for longer the board has stopped by itself: predict no further on commands.
+constexpr double kHorizon_s = 0.3;
+// Gated poses whose innovations differ by less than this agree with each other (m, m, rad).
+constexpr Innovation kAgree{0.02, 0.02, 0.1};
+
+}  // namespace
+
+Fused::Fused(const Assumptions& assumptions, const Geometry& geometry)
+    : assumptions_(assumptions),
+      geometry_(geometry),
+      filter_(assumptions, geometry.d0_m),
+      speeds_(assumptions.wheel_lag_s, assumptions.sigma_accel_rad_s2,
+              assumptions.sigma_short_rad_s15, geometry.rad_per_count) {}
+
+double Fused::pose_age_s(double t_host_s) const {
+  return t_pose_s_ ? t_host_s - *t_pose_s_ : std::numeric_limits<double>::infinity();
+}
+
+void Fused::take_command(double t_effect_s, const Sides& omega_rad_s) {
+  commands_.add(t_effect_s, omega_rad_s);
+}
+
+void Fused::take_wheels(double t_host_s, std::int32_t counts_left, std::int32_t counts_right) {
+  const Report report{t_host_s, counts_left, counts_right};
+  if (!last_) {
+    last_ = report;
+    return;
+  }
+  const Report last = *last_;
+  const double dt_s = report.t_s - last.t_s;
+  if (dt_s <= 0.0) return;
+  last_ = report;
+  const double unit = geometry_.rad_per_count;
+  const Sides turned_rad{unit * counts_between(last.counts_left, report.counts_left),
+                         unit * counts_between(last.counts_right, report.counts_right)};
+  if (std::max(std::fabs(turned_rad[0]), std::fabs(turned_rad[1])) >
+      kOmegaImpossible_rad_s * dt_s) {
+    speeds_.restart();
+    return;
+  }
+  speeds_.step(dt_s, turned_rad, commanded(last.t_s, report.t_s));
+  commands_.forget_before(report.t_s);
+  extend(last.t_s, report.t_s, geometry_.body(turned_rad));
+  if (!path_.empty() && path_.front().begin_s < report.t_s - assumptions_.history_s) {
+    advance(path_.front().end_s);
+  }
+}
+
+// The constant pieces of command between two times.
+const std::vector<Piece>& Fused::commanded(double begin_s, double end_s) const {
+  commands_.segments(begin_s, end_s, pieces_);
+  return pieces_;
+}
+
+// Appends the part of an increment that lies after the anchor, and moves the head over it.
+void Fused::extend(double begin_s, double end_s, const BodyMotion& by) {
+  const double start_s = std::max(begin_s, t_anchor_s_);
+  if (start_s >= end_s) return;
+  const double part = (end_s - start_s) / (end_s - begin_s);
+  const BodyMotion rest{part * by.forward_m, part * by.turn_rad};
+  path_.push_back({start_s, end_s, rest.forward_m, rest.turn_rad});
+  head_ = moved(head_, rest);
+}
+
+// The place after a believed motion, scaled: along the heading half-way through the turn.
+FlatPose Fused::moved(const FlatPose& at, const BodyMotion& by) const {
+  const Vector& x = filter_.mean();
+  const double step = x[kDistance] * by.forward_m, d_theta = x[kTurn] * by.turn_rad;
+  const double middle = at.theta_rad + 0.5 * d_theta;
+  return {at.z1_x_m + step * std::cos(middle), at.z1_y_m + step * std::sin(middle),
+          at.theta_rad + d_theta};
+}
+
+FlatPose Fused::anchor() const {
+  const Vector& x = filter_.mean();
+  return {x[kZ1X], x[kZ1Y], x[kTheta]};
+}
+
+// Time up to which motion is known, from a report or a pose.
+double Fused::t_head() const { return std::max(last_ ? last_->t_s : kNever_s, t_anchor_s_); }
+
+// Wheel angles turned since the head and wheel speeds at t_s, by the lag model.
+WheelSpeeds::Ahead Fused::ahead(double t_s) const {
+  const double begin_s = t_head();
+  return speeds_.ahead(commanded(begin_s, std::min(t_s, begin_s + kHorizon_s)));
+}
+
+// Moves the anchor to t_s over the increments, the last one cut there.
+void Fused::advance(double t_s) {
+  if (t_anchor_s_ > kNever_s && t_s > t_head()) {
+    const BodyMotion beyond = geometry_.body(ahead(t_s).angle_rad);
+    extend(t_head(), t_s, beyond);
+  }
+  double forward = 0.0, turn = 0.0, length = 0.0, angle = 0.0;
+  while (!path_.empty() && path_.front().begin_s < t_s) {
+    Increment& first = path_.front();
+    double step = first.forward_m, d_theta = first.turn_rad;
+    if (first.end_s > t_s) {
+      const double part = (t_s - first.begin_s) / (first.end_s - first.begin_s);
+      const double rest = 1.0 - part;
+      first = {t_s, first.end_s, step * rest, d_theta * rest};
+      step *= part;
+      d_theta *= part;
+    } else {
+      path_.pop_front();
+    }
+    forward += step;
+    turn += d_theta;
+    length += std::fabs(step);
+    angle += std::fabs(d_theta);
+  }
+  if (t_pose_s_) filter_.move(t_s - t_anchor_s_, forward, turn, length, angle);
+  t_anchor_s_ = t_s;
+}
+
+void Fused::take_pose(double t_exposure_s, const Pose& pose, double sigma_xy_m,
+                      double sigma_theta_rad) {
+  if (t_exposure_s <= t_anchor_s_) return;
+  advance(t_exposure_s);
+  if (t_pose_s_) {
+    correct(t_exposure_s, pose, sigma_xy_m, sigma_theta_rad);
+  } else {
+    place(t_exposure_s, pose, sigma_xy_m, sigma_theta_rad);
+  }
+  head_ = anchor();
+  for (const Increment& i : path_) head_ = moved(head_, {i.forward_m, i.turn_rad});
+}
+
+// Sets the anchor on a pose.
+void Fused::place(double t_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad) {
+  filter_.place(pose, sigma_xy_m, sigma_theta_rad);
+  t_pose_s_ = t_s;
+  gated_run_ = 0;
+}
+
+// Corrects the anchor by a pose; a run of gated poses that agree moves it there instead.
+void Fused::correct(double t_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad) {
+  const BodyMotion speed = geometry_.body(speeds_.omega_rad_s());
+  const Innovation innovation = filter_.innovation(pose);
+  // An exposure dated wrongly by sigma_time looks like an error along the motion.
+  const double sigma_time_s = assumptions_.sigma_time_s;
+  const double var_xy = variance(sigma_xy_m) + variance(sigma_time_s * speed.forward_m);
+  const double var_theta = variance(sigma_theta_rad) + variance(sigma_time_s * speed.turn_rad);
+  if (filter_.correct(innovation, var_xy, var_theta, assumptions_.gate_chi2)) {
+    t_pose_s_ = t_s;
+    gated_run_ = 0;
+    return;
+  }
+  ++gated_total_;
+  gated_run_ = gated_poses_agree(innovation) ? gated_run_ + 1 : 1;
+  if (gated_run_ >= assumptions_.reacquire_poses) place(t_s, pose, sigma_xy_m, sigma_theta_rad);
+}
+
+// Whether a gated pose continues a run of gated ones; it is the one to compare with from now on.
+bool Fused::gated_poses_agree(const Innovation& innovation) {
+  bool agree = gated_run_ > 0;
+  for (int i = 0; i < 3; ++i) {
+    agree = agree && std::fabs(innovation[i] - gated_innovation_[i]) < kAgree[i];
+  }
+  gated_innovation_ = innovation;
+  return agree;
+}
+
+// The place at a time before the head, not before the anchor.
+FlatPose Fused::back_at(double t_s) const {
+  FlatPose at = anchor();
+  for (const Increment& i : path_) {
+    if (i.begin_s >= t_s) break;
+    const double part = std::min((t_s - i.begin_s) / (i.end_s - i.begin_s), 1.0);
+    at = moved(at, {part * i.forward_m, part * i.turn_rad});
+  }
+  return at;
+}
+
+std::optional<State> Fused::state_at(double t_host_s) const {
+  if (!t_pose_s_) return std::nullopt;
+  const Vector& x = filter_.mean();
+  const WheelSpeeds::Ahead wheels = ahead(t_host_s);
+  const FlatPose at = t_host_s < t_head() ? back_at(t_host_s)
+                                          : moved(head_, geometry_.body(wheels.angle_rad));
+  const BodyMotion speed = geometry_.body(wheels.omega_rad_s);
+  const double eta1 = x[kDistance] * speed.forward_m, w = x[kTurn] * speed.turn_rad;
+  const double c = std::cos(at.theta_rad), s = std::sin(at.theta_rad);
+  const Pose pose{at.z1_x_m - x[kOffset] * c, at.z1_y_m - x[kOffset] * s, at.theta_rad};
+  return State{pose, eta1, w, {at.z1_x_m, at.z1_y_m}, {eta1 * c, eta1 * s}};
+}
+
+}  // namespace estimator
