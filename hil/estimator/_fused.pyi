@@ -23,9 +23,6 @@ class Assumptions:
 def wrap_pi(angle_rad: float) -> float:
     """Return the angle wrapped to [-pi, pi), as hil.types.wrap_pi does."""
 
-def variance(sigma: float) -> float:
-    """Return sigma**2, as Python rounds it."""
-
 def counts_between(old: int, new: int) -> int:
     """Return new - old of a signed 32-bit counter that may have wrapped in between."""
 

@@ -110,7 +110,6 @@ void bind_odometry(nb::module_& m) {
 
 void bind_filter(nb::module_& m) {
   m.def("wrap_pi", &estimator::wrap_pi, "angle_rad"_a);
-  m.def("variance", &estimator::variance, "sigma"_a);
   nb::class_<PoseFilter>(m, "PoseFilter")
       .def(nb::init<const Assumptions&, double>(), "assumptions"_a, "d0_m"_a)
       .def("place",

@@ -16,14 +16,12 @@ double wrap_pi(double angle_rad) {
   return rest - kPi;
 }
 
-double variance(double sigma) { return std::pow(sigma, 2.0); }
-
 PoseFilter::PoseFilter(const Assumptions& a, double d0_m)
-    : walk_{variance(a.slip_ratio), variance(a.drift_m_s05), variance(a.drift_rad_s05),
-            variance(a.d0_walk_m_rad05)},
+    : walk_{square(a.slip_ratio), square(a.drift_m_s05), square(a.drift_rad_s05),
+            square(a.d0_walk_m_rad05)},
       x_{0.0, 0.0, 0.0, 1.0, 1.0, d0_m} {
-  P_[kDistance][kDistance] = P_[kTurn][kTurn] = variance(a.sigma_scale);
-  P_[kOffset][kOffset] = variance(a.sigma_d0_m);
+  P_[kDistance][kDistance] = P_[kTurn][kTurn] = square(a.sigma_scale);
+  P_[kOffset][kOffset] = square(a.sigma_d0_m);
 }
 
 void PoseFilter::place(const Pose& pose, double sigma_xy_m, double sigma_theta_rad) {
@@ -32,7 +30,7 @@ void PoseFilter::place(const Pose& pose, double sigma_xy_m, double sigma_theta_r
   x_[kZ1X] = pose.x_m + d0 * c;
   x_[kZ1Y] = pose.y_m + d0 * s;
   x_[kTheta] = theta;
-  const double var_xy = variance(sigma_xy_m), var_theta = variance(sigma_theta_rad);
+  const double var_xy = square(sigma_xy_m), var_theta = square(sigma_theta_rad);
   const double var_d0 = P_[kOffset][kOffset];
   for (int i : {kZ1X, kZ1Y, kTheta}) {
     for (int j = 0; j < kStates; ++j) P_[i][j] = P_[j][i] = 0.0;

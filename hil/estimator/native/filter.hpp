@@ -35,9 +35,7 @@ using Innovation = std::array<double, 3>;  // m, m, rad
 // The angle wrapped to [-pi, pi); hil.types.wrap_pi to the bit.
 double wrap_pi(double angle_rad);
 
-// sigma squared by the C library's pow, as Python squares: it differs from a product in the last bit once
-// in a thousand times, and records made before this was C++ replay exactly (docs/replay.md).
-double variance(double sigma);
+inline double square(double x) { return x * x; }
 
 // Mean x and covariance P of [z1_x, z1_y, theta, k_d, k_t, d0] at one instant. d0 shows in how the centre
 // of mass moves aside in a turn (2.31).

@@ -149,8 +149,8 @@ void Fused::correct(double t_s, const Pose& pose, double sigma_xy_m, double sigm
   const Innovation innovation = filter_.innovation(pose);
   // An exposure dated wrongly by sigma_time looks like an error along the motion.
   const double sigma_time_s = assumptions_.sigma_time_s;
-  const double var_xy = variance(sigma_xy_m) + variance(sigma_time_s * speed.forward_m);
-  const double var_theta = variance(sigma_theta_rad) + variance(sigma_time_s * speed.turn_rad);
+  const double var_xy = square(sigma_xy_m) + square(sigma_time_s * speed.forward_m);
+  const double var_theta = square(sigma_theta_rad) + square(sigma_time_s * speed.turn_rad);
   if (filter_.correct(innovation, var_xy, var_theta, assumptions_.gate_chi2)) {
     t_pose_s_ = t_s;
     gated_run_ = 0;
