@@ -312,20 +312,10 @@ def _finite(value: float) -> float | None:
 def check(figures: Figures, scenario: Mapping[str, Any]) -> tuple[Verdict, ...]:
     """Return the verdict on each requirement of a resolved scenario tree.
 
-    `requirements` name a figure with `min`, `max` or both, in the figure's own unit; `manoeuvre`
-    names the side of the start and the way of the turn. Raises BadInput for an unknown figure.
+    `requirements` name a figure with `min`, `max` or both, in the figure's own unit. Raises BadInput
+    for an unknown figure.
     """
-    verdicts = [_judge(figures, item) for item in scenario.get("requirements", ())]
-    manoeuvre = scenario.get("manoeuvre")
-    if manoeuvre:
-        side = {"metric": "start_offset_x_m"} | _sign_limit(manoeuvre["start_side"] == "right")
-        turn = {"metric": "turn_rad"} | _sign_limit(manoeuvre["turn"] == "left")
-        verdicts += [_judge(figures, side), _judge(figures, turn)]
-    return tuple(verdicts)
-
-
-def _sign_limit(positive: bool) -> dict[str, float]:
-    return {"min": 0.0} if positive else {"max": 0.0}
+    return tuple(_judge(figures, item) for item in scenario.get("requirements", ()))
 
 
 def _judge(figures: Figures, item: Mapping[str, Any]) -> Verdict:

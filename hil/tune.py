@@ -14,10 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from hil.config.control import Gains
+from hil.config.control import Gains, PointReference
 from hil.config.events import Disturbance
 from hil.config.load import load_scenario
 from hil.stats import Paired, paired
+from hil.types import wrap_pi
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
@@ -78,7 +79,9 @@ PUSHES = (
 LATE_LINK = {"latency_s": 0.05, "latency_jitter_s": 0.03}
 LATE_CAMERA = {"latency_s": 0.1, "latency_jitter_s": 0.03, "drop_ratio": 0.1}
 
-Variant = Literal["calm", "pushed", "late"]
+# In a beside case the robot stands at right angles to the way to the point, where neither law can do
+# anything about the error at first: z1 moves along the heading alone.
+Variant = Literal["calm", "pushed", "late", "beside"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +96,7 @@ class Case:
         return f"{self.scenario} {self.variant} over {self.inner}"
 
 
-# Each scenario and each variant twice, over either wheel law.
+# Each variant twice, over either wheel law.
 CASES = (
     Case("scenario-1", "calm", "asg-ism"),
     Case("scenario-1", "late", "pid"),
@@ -101,6 +104,8 @@ CASES = (
     Case("scenario-2", "late", "asg-ism"),
     Case("scenario-3", "pushed", "asg-ism"),
     Case("scenario-3", "calm", "pid"),
+    Case("scenario-1", "beside", "asg-ism"),
+    Case("scenario-2", "beside", "pid"),
 )
 
 
@@ -373,7 +378,19 @@ def case_scenario(case: Case, gains: Gains) -> Scenario:
     elif case.variant == "late":
         changed["link"] = scenario.link.model_copy(update=LATE_LINK)
         changed["camera"] = scenario.camera.model_copy(update=LATE_CAMERA)
+    elif case.variant == "beside":
+        changed["start"] = scenario.start.model_copy(update={"theta_rad": _beside(scenario)})
     return scenario.model_copy(update=changed)
+
+
+def _beside(scenario: Scenario) -> float:
+    """Return the heading that has the point at right angles, on the side where it is anyway."""
+    start, goal = scenario.start, scenario.reference
+    if not isinstance(goal, PointReference):
+        raise ValueError(f"{scenario.name}: a beside case needs a point")
+    bearing_rad = math.atan2(goal.y_m - start.y_m, goal.x_m - start.x_m)
+    to_left_rad = wrap_pi(bearing_rad - start.theta_rad)
+    return wrap_pi(bearing_rad - math.copysign(0.5 * math.pi, to_left_rad))
 
 
 @dataclass(frozen=True, slots=True)

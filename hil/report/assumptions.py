@@ -27,7 +27,7 @@ _TABLE = re.compile(r"^\[(?P<table>[\w.]+)\]")
 _UNIT_FIRST = re.compile(r"^[^;:,]{1,12}; ")
 # Kept out of the table: the runs' subject and laws, shown elsewhere, and gain sets not in use.
 _ELSEWHERE = (
-    "name", "description", "requirements", "manoeuvre", "control.gains", "control.outer", "board.LAW",
+    "name", "description", "requirements", "control.gains", "control.outer", "board.LAW",
 )  # fmt: skip
 
 

@@ -122,7 +122,7 @@ def test_search_bounds_are_valid_gains(outer):
         assert {name: gains[name] for name in values} == values
 
 
-def test_cases_are_scenarios_calm_pushed_and_late():
+def test_cases_are_scenarios_calm_pushed_late_and_beside():
     """Each case loads and takes the gains; a variant changes what its name says and nothing else."""
     gains = with_values(BASE, "pid", {"kp_s3": 12.5})
     for case in CASES:
@@ -131,8 +131,22 @@ def test_cases_are_scenarios_calm_pushed_and_late():
         assert scenario.disturbances == (PUSHES if case.variant == "pushed" else ())
         assert (scenario.link.latency_s > plain.link.latency_s) == (case.variant == "late")
         assert (scenario.camera.drop_ratio > plain.camera.drop_ratio) == (case.variant == "late")
-    assert Counter(case.variant for case in CASES) == {"calm": 2, "pushed": 2, "late": 2}
-    assert Counter(case.inner for case in CASES) == {"asg-ism": 3, "pid": 3}
+        assert (scenario.start != plain.start) == (case.variant == "beside")
+    variants = Counter(case.variant for case in CASES)
+    assert variants == {"calm": 2, "pushed": 2, "late": 2, "beside": 2}
+    assert Counter(case.inner for case in CASES) == {"asg-ism": 4, "pid": 4}
+
+
+@pytest.mark.parametrize(("name", "side"), [("scenario-1", -1.0), ("scenario-2", 1.0)])
+def test_beside_the_point_lies_on_the_side_to_turn_to(name, side):
+    """The way to the point is at right angles to the heading: to the right in scenario 1."""
+    scenario = case_scenario(Case(name, "beside", "pid"), BASE)
+    start, goal = scenario.start, scenario.reference
+    dx, dy = goal.x_m - start.x_m, goal.y_m - start.y_m
+    ahead = math.cos(start.theta_rad) * dx + math.sin(start.theta_rad) * dy
+    left = math.cos(start.theta_rad) * dy - math.sin(start.theta_rad) * dx
+    assert ahead == pytest.approx(0.0, abs=1e-12)
+    assert math.copysign(1.0, left) == side
 
 
 def test_verdict_pairs_both_laws_by_seed(tuned):

@@ -26,8 +26,11 @@ def scenario(name: str = "scenario-1", duration_s: float = 4.0) -> dict:
         "duration_s": duration_s,
         "start": {"x_m": -0.6, "y_m": 0.2, "theta_rad": 0.6},
         "reference": {"kind": "point", "x_m": 0.4, "y_m": 0.0},
-        "manoeuvre": {"start_side": "left", "turn": "right"},
-        "requirements": [{"metric": "delta1_worst_last_second_m", "min": None, "max": 0.02}],
+        "requirements": [
+            {"metric": "delta1_worst_last_second_m", "min": None, "max": 0.02},
+            {"metric": "start_offset_x_m", "min": None, "max": 0.0},
+            {"metric": "turn_rad", "min": None, "max": 0.0},
+        ],
         "robot": {"wheel_radius_m": 0.0482, "mass_kg": 2.8},
         "link": {"baud": 57600, "loss_ratio": 0.01},
         "control": {"rate_hz": 30.0, "eta1_max_m_s": 0.5},

@@ -163,9 +163,10 @@ def test_requirements_hold_and_fail():
     assert metrics.all_hold([])
 
 
-def test_manoeuvre_is_checked_by_sign():
+def test_side_and_turn_are_checked_by_sign():
     """Start left and turn right: fails for the mirrored run, which a wrong sign would give."""
-    scenario = {"manoeuvre": {"start_side": "left", "turn": "right"}}
+    limits = ("start_offset_x_m", "turn_rad")
+    scenario = {"requirements": [{"metric": name, "max": 0.0} for name in limits]}
     turning_right = 0.5 - T_S / 10
     good = metrics.compute(columns(delta1_x_m=-0.5, est_theta_rad=turning_right))
     mirrored = metrics.compute(columns(delta1_x_m=0.5, est_theta_rad=-turning_right))

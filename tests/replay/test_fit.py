@@ -43,10 +43,14 @@ def test_parameters_of_the_recorded_robot_are_found(fit: Fit) -> None:
 
 
 def test_fit_holds_on_parts_it_has_not_seen(fit: Fit) -> None:
-    """On windows held out the fitted twin is several times closer than the unfitted one."""
+    """On windows held out the fitted twin is several times closer than the unfitted one.
+
+    Except in the wheel speeds: the wheel law makes them follow the set-points on any robot.
+    """
     assert fit.windows_held_out >= 3
-    for name in ("wheel speed", "pwm", "forward", "turn"):
+    for name in ("pwm", "forward", "turn"):
         assert fit.residual_held_out[name] < 0.5 * fit.residual_unfitted[name], name
+    assert fit.residual_held_out["wheel speed"] < 0.05
 
 
 def test_answer_carries_its_checks(made: Path, fit: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
