@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import cv2
 
 from hil.clocks import CameraClock
+from hil.ctrl_c import CtrlC
 from hil.estimator import BelievedGeometry, make_estimator
 from hil.laws import make_outer_law
 from hil.metrics import LinkStats
@@ -100,9 +101,11 @@ def execute(
             frame_rate_hz=spec.scenario.camera.rate_hz,
             rerun=spec.rerun,
         )
-        parts = make_parts(spec, TapedRig(rig, recorder.tape), recorder)
+        ctrl_c = CtrlC()
+        parts = make_parts(spec, TapedRig(rig, recorder.tape, ctrl_c.obey), recorder)
         session = Session(spec.scenario, parts, parameters, board_hashes, progress, publish)
-        ending = session.run()
+        with ctrl_c:
+            ending = session.run()
         return recorder.close(ending.outcome, ending.detail, link_stats(parts.link))
     finally:
         rig.close()

@@ -88,9 +88,13 @@ class TapedStream:
 
 
 class TapedRig:
-    """A rig whose every answer is taped; otherwise it is the rig itself."""
+    """A rig whose every answer is taped; otherwise it is the rig itself.
 
-    def __init__(self, rig: Rig, tape: TapeWriter) -> None:
+    `obey` may raise KeyboardInterrupt; it is called at each wait, before it (`hil.ctrl_c`).
+    """
+
+    def __init__(self, rig: Rig, tape: TapeWriter, obey: Callable[[], None]) -> None:
+        self._obey = obey
         self._rig = rig
         self._tape = tape
         self._kind = WAITED
@@ -110,6 +114,7 @@ class TapedRig:
         """Return at `until_s`, or earlier as soon as bytes or a frame have arrived."""
         self._kind = WAITED
         try:
+            self._obey()
             self._wait(until_s)
         except (RigFault, KeyboardInterrupt) as cause:
             self._tape.stop(IN_WAIT, cause)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ from hil.errors import BadInput, RigFault
 from hil.record.journal import read_parquet, write_parquet
 from hil.record.schema import SAMPLE_COLUMNS
 from hil.replay.exact import COMMANDS, replay
-from tests.replay.records import cut, record, record_on_wall_clock, unclose
+from hil.run import execute
+from tests.replay.records import cut, record, record_on_wall_clock, spec, unclose
 
 GAIN = "control.gains.tuned.asg_ism.k1_s"
 GAIN_VALUE = load_scenario("scenario-1").control.gains.tuned.asg_ism.k1_s
@@ -84,6 +86,27 @@ def test_stop_in_mid_run_is_told_again(tmp_path: Path, stop: BaseException, outc
         made.manifest.outcome, made.manifest.outcome_detail,
     )  # fmt: skip
     assert 25 < report.ticks_replayed < 40
+
+
+def test_ctrl_c_in_the_middle_of_a_tick_is_told_again(tmp_path: Path) -> None:
+    """A real SIGINT while the host computes takes effect at the next wait, and so in the replay."""
+    own = spec(tmp_path / "run")
+    pressed = False
+
+    def press(t_s: float) -> None:
+        nonlocal pressed
+        if t_s > 1.0 and not pressed:
+            pressed = True
+            signal.raise_signal(signal.SIGINT)
+
+    handler = signal.getsignal(signal.SIGINT)
+    made = execute(own, press)
+    assert signal.getsignal(signal.SIGINT) is handler
+    assert made.manifest.outcome == "interrupted"
+    assert made.samples["t_s"][-1] < 1.1
+    report = replay(made.path)
+    assert report.identical, report.first
+    assert report.ending.outcome == "interrupted"
 
 
 def test_gain_changed_by_one_percent_is_told_apart(shared: Path) -> None:

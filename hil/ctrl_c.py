@@ -1,0 +1,45 @@
+"""Ctrl-C during a run: obeyed at the rig's next wait, so that it falls on a known instant.
+
+Python raises KeyboardInterrupt wherever the program happens to be; a replay could not stop there
+again. A wait is at most one outer tick away (1/30 s), and the stop of the robot begins in it.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from types import FrameType, TracebackType
+from typing import Any, Self
+
+
+class CtrlC:
+    """Takes Ctrl-C while it is entered; in a thread that is not the main one it does nothing."""
+
+    def __init__(self) -> None:
+        self._asked = False
+        self._before: Any = None
+
+    def __enter__(self) -> Self:
+        """Begin to take Ctrl-C."""
+        if threading.current_thread() is threading.main_thread():
+            self._before = signal.signal(signal.SIGINT, self._ask)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Leave Ctrl-C as it was."""
+        if self._before is not None:
+            signal.signal(signal.SIGINT, self._before)
+
+    def _ask(self, _number: int, _frame: FrameType | None) -> None:
+        self._asked = True
+
+    def obey(self) -> None:
+        """Raise KeyboardInterrupt if Ctrl-C was pressed; once for each time."""
+        if self._asked:
+            self._asked = False
+            raise KeyboardInterrupt
