@@ -52,20 +52,21 @@ def command(
     """
     from hil.cli.progress import run_progress
     from hil.record.manifest import read_manifest
-    from hil.replay import firmware as wheel_replay
+    from hil.replay.elf import elf as elf_firmware
     from hil.replay.exact import replay
+    from hil.replay.firmware import core, replay_wheels
     from hil.replay.output import claim_folder, write_output
     from hil.replay.what_if import what_if
 
     duration_s = float(read_manifest(run).scenario.get("duration_s", 0.0))
-    through = wheel_replay.elf() if elf else wheel_replay.core()
+    through = elf_firmware() if elf else core()
     if out is not None:
         claim_folder(out)
     with run_progress({run.name: duration_s}) as update:
         report = replay(run, outer, overrides, lambda t_s: update(run.name, t_s))
     board_changes = [text for text in overrides if text.startswith("board.")]
     asked = firmware or elf or inner or board_changes
-    wheels = wheel_replay.replay_wheels(run, inner, board_changes, through) if asked else None
+    wheels = replay_wheels(run, inner, board_changes, through) if asked else None
     answer = what_if(run, outer, overrides) if fit else None
     document = report.to_json() | {
         "firmware": wheels.to_json() if wheels else None,

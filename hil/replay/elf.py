@@ -7,7 +7,7 @@ the timers: nothing between the pins is replaced.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +17,7 @@ import numpy as np
 from hil._firmware import PWM_TOP, TICK_US
 from hil.errors import BadInput, RigFault
 from hil.firmware import build
+from hil.replay.firmware import Firmware
 from hil.wire import dialect
 from hil.wire.framing import FrameReader, FrameWriter
 
@@ -38,8 +39,8 @@ _BATTERY_V = 12.0  # as the core's binding has it
 _AB = (0b00, 0b10, 0b11, 0b01)  # lines of an encoder over a period, forward
 
 
-def elf_board() -> tuple[str, Callable[[Sequence[Sent], Sequence[Tick]], Pwm]]:
-    """Return the build's id and the function from frames and ticks to PWM on its ELF.
+def elf() -> Firmware:
+    """Return the ELF under simavr as a firmware to replay wheels with.
 
     Raises BadInput in one line, with the packages to install, where simavr or avr-gcc is missing.
     """
@@ -49,7 +50,7 @@ def elf_board() -> tuple[str, Callable[[Sequence[Sent], Sequence[Tick]], Pwm]]:
     if missing:
         raise BadInput(f"replay through the ELF cannot run here: {missing}")
     made = build()
-    return made.build_id, lambda frames, ticks: elf_pwm(made.elf, frames, ticks)
+    return Firmware("elf", made.build_id, lambda frames, ticks: elf_pwm(made.elf, frames, ticks))
 
 
 def elf_pwm(elf: Path, frames: Sequence[Sent], ticks: Sequence[Tick]) -> Pwm:

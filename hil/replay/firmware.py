@@ -24,7 +24,6 @@ from hil.config.load import build, check_board, set_value
 from hil.config.scenario import Scenario
 from hil.errors import BadInput
 from hil.record import layout
-from hil.replay.elf import elf_board
 from hil.replay.exact import Source, read_source
 from hil.run import board_parameters
 from hil.wire import dialect
@@ -166,11 +165,6 @@ def replay_wheels(
 def core() -> Firmware:
     """Return the firmware core compiled for this machine."""
     return Firmware("core", BUILD_ID, _core_pwm)
-
-
-def elf() -> Firmware:
-    """Return the ELF under simavr; BadInput with the packages that are missing, if any."""
-    return Firmware("elf", *elf_board())
 
 
 def replay_firmware(
