@@ -14,9 +14,10 @@ from hil.cli.options import json_option, print_json
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from hil.held_out import Verdict
     from hil.metrics import Metric
     from hil.stats import Paired
-    from hil.tune import Figures, Found, Trial, Verdict
+    from hil.tune import Figures, Found, Trial
 
 
 @click.command("tune")
@@ -50,19 +51,10 @@ def command(
     from hil.cli.progress import stage_progress
     from hil.config.control import ControlConfig
     from hil.errors import BadInput
+    from hil.held_out import held_out_trials, judge, with_verdict
     from hil.record.manifest import git_revision
     from hil.sweep.crew import Pool
-    from hil.tune import (
-        SEARCH,
-        OnTarget,
-        Plan,
-        held_out_trials,
-        judge,
-        search,
-        with_origin,
-        with_verdict,
-        write_gain_set,
-    )
+    from hil.tune import SEARCH, OnTarget, Plan, search, with_origin, write_gain_set
 
     if out.exists():
         raise BadInput(f"--out {out}: exists already; name a new file")
@@ -113,8 +105,8 @@ def _table(verdict: Verdict) -> Table:
     """Return the paired differences, a row per figure and a column per scenario."""
     from rich.table import Table
 
+    from hil.held_out import ALL_SCENARIOS
     from hil.metrics import BY_NAME
-    from hil.tune import ALL_SCENARIOS
 
     seeds = f"seeds {verdict.seeds[0]} to {verdict.seeds[-1]}"
     table = Table(

@@ -8,24 +8,26 @@ import pytest
 
 from hil.config.control import ControlConfig, Gains
 from hil.config.load import load_scenario
-from hil.tune import (
+from hil.held_out import (
     ALL_SCENARIOS,
+    HELD_OUT_SCENARIOS,
+    held_out_trials,
+    judge,
+    with_verdict,
+)
+from hil.tune import (
     CASES,
     COST_FAILED,
     COST_WEIGHTS,
-    HELD_OUT_SCENARIOS,
     PUSHES,
     SEARCH,
     Case,
     Plan,
     case_scenario,
     decode,
-    held_out_trials,
-    judge,
     run_cost,
     tune,
     with_values,
-    with_verdict,
     write_gain_set,
 )
 
