@@ -153,10 +153,12 @@ class Session:
     def _arm(self) -> None:
         link = self._parts.link
         self._may_move = True  # from here on the robot is stopped, whatever the board last said
+        now_s = self._parts.rig.now_s()
         link.begin(bringup.arm(link, self._dialect_hash, self._parameter_hash))
-        self._pump_while(lambda: link.busy, math.inf)
-        # Set-points must follow at once: the board stops by itself after 250 ms of silence.
-        self._send_wheels(0.0, 0.0)
+        self._pump_until(now_s)  # the command goes out
+        # Set-points go right behind it: the board stops by itself after 250 ms of silence, and
+        # its answer may take longer.
+        self._pump_while(lambda: link.busy, math.inf, feed=True)
         if not self._pump_while(
             lambda: not link.armed, self._parts.rig.now_s() + _ARM_TIMEOUT_S, feed=True
         ):

@@ -19,7 +19,7 @@ from hil.wire.link import BoardLink, Procedure, enum_name
 # Opening the port of an Arduino resets it; its boot loader holds it for up to 2 s.
 _FIRST_HEARTBEAT_S = 6.0
 _REPLY_S = 0.5
-_TRIES = 6
+_TRIES = 10
 # A PARAM_VALUE takes 6.4 ms at 57,600 baud, and half of the line belongs to the wheel states.
 _PARAMETER_PACE_S = 0.02
 # The board says at most five texts a second.

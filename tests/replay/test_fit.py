@@ -15,10 +15,24 @@ from hil.replay.what_if import what_if
 from tests.replay.records import record
 
 
+WINDING = {
+    "reference": {
+        "kind": "waypoints",
+        "points_m": [[-0.6, -0.32], [-0.5, 0.2], [0.0, 0.3], [0.3, -0.1], [0.6, 0.2]],
+        "speed_max_m_s": 0.35,
+        "turn_rate_max_rad_s": 2.0,
+    }
+}
+
+
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a run to the point, of a robot some 10 % off what the host believes."""
-    return record(tmp_path_factory.mktemp("fit") / "run", ("duration_s=7",)).path
+    """Return a run along a winding path, of a robot some 10 % off what the host believes.
+
+    A run to a point has three seconds of motion, most of it straight on: from so little, friction
+    of motors and of floor cannot be told apart.
+    """
+    return record(tmp_path_factory.mktemp("fit") / "run", ("duration_s=12",), WINDING).path
 
 
 @pytest.fixture(scope="module")
@@ -43,14 +57,10 @@ def test_parameters_of_the_recorded_robot_are_found(fit: Fit) -> None:
 
 
 def test_fit_holds_on_parts_it_has_not_seen(fit: Fit) -> None:
-    """On windows held out the fitted twin is several times closer than the unfitted one.
-
-    Except in the wheel speeds: the wheel law makes them follow the set-points on any robot.
-    """
+    """On windows held out the fitted twin is several times closer than the unfitted one."""
     assert fit.windows_held_out >= 3
-    for name in ("pwm", "forward", "turn"):
+    for name in ("wheel speed", "pwm", "forward", "turn"):
         assert fit.residual_held_out[name] < 0.5 * fit.residual_unfitted[name], name
-    assert fit.residual_held_out["wheel speed"] < 0.05
 
 
 def test_answer_carries_its_checks(made: Path, fit: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
