@@ -14,7 +14,6 @@ from hil.replay.fit import Fit, Rehearsal, fit_twin
 from hil.replay.what_if import what_if
 from tests.replay.records import record
 
-
 WINDING = {
     "reference": {
         "kind": "waypoints",
