@@ -16,7 +16,7 @@ import numpy as np
 from hil.metrics import BY_NAME
 from hil.report.repeats import Arm, arm_names, law_rank
 from hil.stats import Interval, Paired, paired, t_interval
-from hil.sweep.campaign import Campaign
+from hil.sweep.campaign import HOLDS, Campaign, metric_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -95,7 +95,7 @@ def outcomes_of(campaign: Campaign, table: pa.Table) -> Outcomes:
         tuple(arms[i] for i in order),
         tuple(names[arms[i]] for i in order),
         {axis: by_pair(axis)[:, 0] for axis in campaign.axes},
-        {name: by_pair(name).astype(np.float64)[:, order] for name in BY_NAME},
+        {name: by_pair(name).astype(np.float64)[:, order] for name in (*BY_NAME, HOLDS.name)},
         (by_pair("outcome") == "complete")[:, order],
     )
 
@@ -109,7 +109,7 @@ def documents(outcomes: Outcomes) -> Iterator[dict[str, Any]]:
                 yield {
                     "axis": axis,
                     "figure": figure,
-                    "unit": BY_NAME[figure].unit,
+                    "unit": metric_of(figure).unit,
                     "other": outcomes.labels[arm],
                     "baseline": outcomes.labels[0],
                     "stations": [
@@ -131,7 +131,7 @@ def sentences(outcomes: Outcomes) -> list[str]:
                 said.setdefault(_verdict(figure, result), []).append(short(station.value))
             told = "; ".join(f"{verdict} at {', '.join(at)}" for verdict, at in said.items())
             lines.append(
-                f"{BY_NAME[figure].label} along {axis}: {outcomes.labels[arm]} against "
+                f"{metric_of(figure).label} along {axis}: {outcomes.labels[arm]} against "
                 f"{outcomes.labels[0]} is {told}."
             )
     return lines
@@ -140,7 +140,7 @@ def sentences(outcomes: Outcomes) -> list[str]:
 def _verdict(figure: str, result: Paired) -> str:
     if not result.certain:
         return "not told apart"
-    return "better" if (result.mean < 0) == (BY_NAME[figure].better == "lower") else "worse"
+    return "better" if (result.mean < 0) == (metric_of(figure).better == "lower") else "worse"
 
 
 def short(value: float | str) -> str:

@@ -20,10 +20,26 @@ from hil.config.control import OuterLawName
 from hil.config.load import build, check_board, load_scenario, put_value, read_tree
 from hil.config.scenario import Scenario
 from hil.errors import BadInput
-from hil.metrics import require_known
+from hil.metrics import BY_NAME, Metric, require_known
 
 Point = dict[str, Any]
 InnerLawName = Literal["asg-ism", "pid"]
+
+
+# Unlike the figures of a run, every run has it, also one that ended early.
+HOLDS = Metric(
+    "holds",
+    "",
+    "runs that met every requirement",
+    "1 for a run that came to its end and met every requirement, else 0",
+    "higher",
+    shown=("%", 1e2),
+)
+
+
+def metric_of(figure: str) -> Metric:
+    """Return a figure that a campaign can draw; raises BadInput with near names when unknown."""
+    return HOLDS if figure == HOLDS.name else BY_NAME[require_known(figure)]
 
 
 class Range(Section):
@@ -100,7 +116,7 @@ class CampaignFile(Section):
     )
     random: dict[str, Distribution] = Field(default_factory=dict)
     figures: tuple[str, ...] = Field(
-        ("ise_m2_s", "pwm_variation_counts"), min_length=1, description="figures drawn as maps"
+        ("ise_m2_s", "pwm_variation_counts"), min_length=1, description="figures drawn, or holds"
     )
 
     @model_validator(mode="after")
@@ -198,7 +214,7 @@ def load_campaign(name_or_path: str) -> Campaign:
     tree.setdefault("name", path.stem)
     file = _checked(tree, path)
     for figure in file.figures:
-        require_known(figure)
+        metric_of(figure)
     name = file.scenario
     if name.endswith(".toml") and not Path(name).is_absolute():
         name = str(path.parent / name)

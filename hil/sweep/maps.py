@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from hil.metrics import BY_NAME
 from hil.record.manifest import replace_file
 from hil.report import figures as draw
 from hil.sweep.answers import Outcomes, sentences, short
+from hil.sweep.campaign import metric_of
 
 # The colours of hil/report/report.html.j2, so that both pages look alike.
 _STYLE = """
@@ -56,7 +56,8 @@ def _described(outcomes: Outcomes) -> str:
     return (
         f"{pairs * arms} runs of {file.scenario} on {file.target} with --camera {file.camera}: "
         f"{pairs} pairs of {arms} arms. Runs that came to their end, of {pairs} each: {ended}. "
-        "Runs that did not (a safety stop) have no figures and drop their pair."
+        "Runs that did not (a safety stop) have no figures and drop their pair, except in the share of "
+        "runs that met every requirement."
     )
 
 
@@ -67,7 +68,7 @@ def _figures(outcomes: Outcomes) -> list[str]:
         found.append(
             _captioned(
                 line_figure(outcomes, axis, figure),
-                f"{BY_NAME[figure].label} along {axis}. Left: mean of each arm with its 95 % "
+                f"{metric_of(figure).label} along {axis}. Left: mean of each arm with its 95 % "
                 f"interval. Right: paired difference to {outcomes.labels[0]} with its 95 % "
                 "interval; all other values are averaged over.",
             )
@@ -77,7 +78,7 @@ def _figures(outcomes: Outcomes) -> list[str]:
             found.append(
                 _captioned(
                     map_figure(outcomes, axes[0], axes[1], figure),
-                    f"{BY_NAME[figure].label}: difference to {outcomes.labels[0]} in percent of "
+                    f"{metric_of(figure).label}: difference to {outcomes.labels[0]} in percent of "
                     "it. Blue: lower, red: higher. A dot marks a 95 % interval without zero.",
                 )
             )
@@ -92,7 +93,7 @@ def line_figure(outcomes: Outcomes, axis: str, figure: str) -> str:
     """Draw each arm's level, and each other arm's paired difference, along one value."""
     sheet = draw.Sheet(2, 2.6)
     levels, differences = sheet.axes
-    metric = BY_NAME[figure]
+    metric = metric_of(figure)
     factor = metric.shown[1] if metric.shown else 1.0
     stations = outcomes.stations(axis)
     x = np.array([station.value for station in stations], dtype=np.float64)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
@@ -134,3 +135,23 @@ def test_answers_and_page(campaign: Campaign, finished: Path, tmp_path: Path) ->
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 6
     assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_share_of_runs_that_hold_counts_those_without_figures(tmp_path: Path) -> None:
+    """On a link that loses nearly everything no run ends by itself: no figures, and not held."""
+    path = tmp_path / "cut.toml"
+    path.write_text(
+        'scenario = "scenario-1"\n'
+        'set = ["duration_s=1", "requirements=[]", "link.loss_burst_chunks=10"]\n'
+        'figures = ["holds", "iae_m_s"]\n'
+        '[grid]\n"link.loss_ratio" = [0.0, 0.9]\n',
+        encoding="utf-8",
+    )
+    campaign = load_campaign(str(path))
+    table, _ = run_campaign(campaign, tmp_path / "results", workers=2)
+    outcomes = outcomes_of(campaign, table)
+    whole, broken = (s.pairs for s in outcomes.stations("link.loss_ratio"))
+    assert outcomes.level("holds", 0, whole)[0] == 1.0
+    assert outcomes.level("holds", 0, broken)[0] == 0.0
+    assert np.isnan(outcomes.figures["iae_m_s"][broken]).all()
+    assert any("met every requirement" in line for line in sentences(outcomes))
