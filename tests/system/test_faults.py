@@ -9,7 +9,7 @@ import pytest
 from hil.record.reader import RunRecord, read_run
 from tests.system.runs import run, scenario_with
 
-FAULT_AT_S = 2.0  # under way at full approach speed
+FAULT_AT_S = 1.5  # under way at full approach speed
 
 
 def faulty(kind: str, out: Path, side: str = "both", **kwargs: str) -> RunRecord:
