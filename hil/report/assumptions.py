@@ -19,12 +19,13 @@ from pydantic_core import PydanticUndefined
 
 from hil._firmware import Parameter, parameter_table
 from hil.config.control import Gains
-from hil.config.load import unit_of
+from hil.config.load import UNITS, unit_of
 from hil.config.scenario import Scenario
 
 _LINE = re.compile(r'^"?(?P<key>[\w.]+)"?\s*=\s*(?P<value>[^#]*?)\s*(?:#\s*(?P<note>.*))?$')
 _TABLE = re.compile(r"^\[(?P<table>[\w.]+)\]")
 _UNIT_FIRST = re.compile(r"^[^;:,]{1,12}; ")
+_DESCRIBED = re.compile(r"^(?P<unit>[^\s,]+)(?: at [^,]*)?, ")
 # Kept out of the table: the runs' subject and laws, shown elsewhere, and gain sets not in use.
 _ELSEWHERE = (
     "name", "description", "requirements", "control.gains", "control.outer", "board.LAW",
@@ -66,8 +67,7 @@ def gain_assumptions(outer: str, values: Mapping[str, Any], source: str) -> list
         Assumption(
             key,
             f"{value:g}" if isinstance(value, float) else str(value),
-            unit_of(key),
-            fields[key].description or "" if key in fields else "",
+            *_split(fields[key].description or "" if key in fields else "", ""),
             source,
         )
         for key, value in values.items()
@@ -82,7 +82,15 @@ def _told(top: str, key: str, scenario: Mapping[str, Any]) -> tuple[str, str]:
     if top == "board" and name in _board_parameters():
         parameter = _board_parameters()[name]
         return parameter.unit, parameter.doc
-    return unit_of(name), _meaning(key, scenario)
+    return _split(_meaning(key, scenario), unit_of(name))
+
+
+def _split(description: str, unit: str) -> tuple[str, str]:
+    """Return unit and meaning of a description, which may begin with its unit: "1/s^3, on delta1"."""
+    found = _DESCRIBED.match(description)
+    if found and (found["unit"] in UNITS.values() or set("/^") & set(found["unit"])):
+        return found["unit"], description[found.end() :]
+    return unit, description
 
 
 @functools.cache

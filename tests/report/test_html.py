@@ -191,4 +191,13 @@ def test_every_value_of_a_shipped_scenario_says_what_it_means():
     assert items["board.ISM_K0"].unit == "duty"
     gains = gain_assumptions("asg-ism", tree["control"]["gains"]["tuned"]["asg_ism"], "set tuned")
     assert all(item.meaning and item.source == "set tuned" for item in gains)
-    assert {item.key: item.unit for item in gains}["mu0_s"] == "s"
+    units = {item.key: item.unit for item in gains}
+    assert (units["k1_s"], units["alpha_m_s3"], units["mu0_s"], units["p"]) == (
+        "1/s",
+        "m/s^3",
+        "s",
+        "",
+    )
+    speed = items["control.limits.eta1_max_m_s"]
+    assert speed.unit == "m/s"
+    assert speed.meaning.startswith("forward speed command")
