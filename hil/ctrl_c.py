@@ -1,7 +1,8 @@
 """Ctrl-C during a run: obeyed at the rig's next wait, so that it falls on a known instant.
 
 Python raises KeyboardInterrupt wherever the program happens to be; a replay could not stop there
-again. A wait is at most one outer tick away (1/30 s), and the stop of the robot begins in it.
+again. A session waits at least once a tick, so the stop of the robot begins within one (1/30 s, or
+what a late host needs for it). Ctrl-C once more, before that, is KeyboardInterrupt at once.
 """
 
 from __future__ import annotations
@@ -36,6 +37,8 @@ class CtrlC:
             signal.signal(signal.SIGINT, self._before)
 
     def _ask(self, _number: int, _frame: FrameType | None) -> None:
+        if self._asked:
+            raise KeyboardInterrupt
         self._asked = True
 
     def obey(self) -> None:

@@ -106,7 +106,9 @@ def execute(
         session = Session(spec.scenario, parts, parameters, board_hashes, progress, publish)
         with ctrl_c:
             ending = session.run()
-        return recorder.close(ending.outcome, ending.detail, link_stats(parts.link))
+        record = recorder.close(ending.outcome, ending.detail, link_stats(parts.link))
+        ctrl_c.obey()  # pressed after the last wait: this run is whole, whatever follows is not begun
+        return record
     finally:
         rig.close()
 

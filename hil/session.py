@@ -209,14 +209,21 @@ class Session:
     # -- events --------------------------------------------------------------------------------
 
     def _pump_until(self, until_s: float) -> None:
-        """Take bytes and frames as they arrive until `until_s`."""
+        """Take bytes and frames as they arrive until `until_s`; wait at least once, if for no time.
+
+        Ctrl-C is obeyed in waits (`hil.ctrl_c`): a host that is always late must come to one too.
+        """
         rig = self._parts.rig
+        waited = False
         while True:
             now_s = rig.now_s()
             self._take_all(now_s)
             if now_s >= until_s:
-                return
+                break
             rig.wait(until_s)
+            waited = True
+        if not waited:
+            rig.wait(now_s)
 
     def _pump_while(
         self, waiting: Callable[[], bool], until_s: float, *, feed: bool = False

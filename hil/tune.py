@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from hil.config.control import Gains, PointReference
 from hil.config.events import Disturbance
 from hil.config.load import load_scenario
+from hil.record.manifest import replace_file
 from hil.types import wrap_pi
 
 if TYPE_CHECKING:
@@ -123,9 +124,15 @@ class Plan:
 
     cases: tuple[Case, ...] = CASES
     seeds: tuple[int, ...] = (1, 2)
-    candidates: int = 300
+    candidates: int = 301
     population: int = 10
     search_seed: int = 1
+
+    @property
+    def trials(self) -> int:
+        """Return the runs of one law: whole populations after the start."""
+        tried = 1 + (self.candidates - 1) // self.population * self.population
+        return tried * len(self.cases) * len(self.seeds)
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,10 +239,31 @@ def tune(
     *,
     target: str,
     revision: str,
+    progress: Callable[[str, float], None] | None = None,
 ) -> Gains:
-    """Return the tuned gains of both laws with their origin; `base` holds what is not searched."""
-    found = {outer: search(outer, base, evaluate, plan) for outer in SEARCH}
+    """Return the tuned gains of both laws with their origin; `base` holds what is not searched.
+
+    `progress` is told the law and its best cost so far.
+    """
+
+    def searched(outer: str) -> Found:
+        told = (lambda _done, best: progress(outer, best)) if progress else None
+        return search(outer, base, evaluate, plan, told)
+
+    found = {outer: searched(outer) for outer in SEARCH}
     return with_origin(base, found, plan, target=target, revision=revision)
+
+
+def near_bounds(gains: Gains) -> list[str]:
+    """Return what lies within 3 % of the way to an edge of its search box, where the box decided."""
+    found = []
+    for outer, box in SEARCH.items():
+        values = gains.model_dump()[outer.replace("-", "_")]
+        for name, (low, _, high) in box.items():
+            at = math.log(values[name] / low) / math.log(high / low)
+            if not 0.03 < at < 0.97:
+                found.append(f"{outer} {name} = {values[name]:g} (searched {low:g} to {high:g})")
+    return found
 
 
 def with_origin(
@@ -270,7 +298,7 @@ def write_gain_set(path: Path, gains: Gains) -> None:
             f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value!r}"
             for key, value in values.items()
         ]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    replace_file(path, ("\n".join(lines) + "\n").encode())
 
 
 def case_scenario(case: Case, gains: Gains) -> Scenario:

@@ -74,7 +74,7 @@ class Stage:
         """Count one job."""
         self.bars.advance(self.task)
 
-    def best(self, _done: int, cost: float) -> None:
+    def best(self, cost: float) -> None:
         """Show the least cost so far beside the name."""
         self.bars.update(self.task, description=f"{self.name}, best cost {cost:.4f}")
 

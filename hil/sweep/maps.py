@@ -11,7 +11,7 @@ import numpy as np
 from hil.record.manifest import replace_file
 from hil.report import figures as draw
 from hil.sweep.answers import Outcomes, sentences, short
-from hil.sweep.campaign import metric_of
+from hil.sweep.campaign import HOLDS, metric_of
 
 # The colours of hil/report/report.html.j2, so that both pages look alike.
 _STYLE = """
@@ -78,8 +78,10 @@ def _figures(outcomes: Outcomes) -> list[str]:
             found.append(
                 _captioned(
                     map_figure(outcomes, axes[0], axes[1], figure),
-                    f"{metric_of(figure).label}: difference to {outcomes.labels[0]} in percent of "
-                    "it. Blue: lower, red: higher. A dot marks a 95 % interval without zero.",
+                    f"{metric_of(figure).label}: difference to {outcomes.labels[0]} in percent"
+                    f"{' of all runs' if figure == HOLDS.name else ' of it'}. Blue: lower, red: "
+                    f"higher; {metric_of(figure).better} is better. A dot marks a 95 % interval "
+                    "without zero.",
                 )
             )
     return found
@@ -131,8 +133,10 @@ def map_figure(outcomes: Outcomes, x_axis: str, y_axis: str, figure: str) -> str
         for (j, row), (i, column) in itertools.product(enumerate(rows), enumerate(columns)):
             pairs = np.intersect1d(row.pairs, column.pairs)
             result = outcomes.difference(figure, arm, pairs)
-            if result.pairs and result.baseline_mean:
-                shares[j, i] = 100.0 * result.mean / abs(result.baseline_mean)
+            # A share of runs is a percentage already.
+            whole = 1.0 if figure == HOLDS.name else abs(result.baseline_mean)
+            if result.pairs and whole:
+                shares[j, i] = 100.0 * result.mean / whole
             if result.certain:
                 axes.plot(i, j, ".", ms=3, color=draw.INK)
         reach = float(np.nanmax(np.abs(shares), initial=1.0))

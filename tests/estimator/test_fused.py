@@ -136,6 +136,17 @@ def test_a_pose_without_a_number_is_gated(bad):
     assert position_errors(late)[-1] < 0.005
 
 
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_first_pose_without_a_number_is_gated(bad):
+    """Whether pose or time, the estimator waits for the next one and starts there."""
+    estimator, world = make()
+    estimator.on_pose(world.t, PoseMeasurement(Pose(bad, 0.0, 0.0), 1.0))
+    estimator.on_pose(math.nan, PoseMeasurement(Pose(0.0, 0.0, 0.0), 1.0))
+    assert estimator.estimate_at(world.t) is None
+    late = world.run(1.0, weave)
+    assert position_errors(late)[-1] < 0.005
+
+
 def test_a_count_beyond_32_bits_is_refused():
     """The board's counters are int32: a value that none can have is the caller's mistake."""
     estimator, _ = make()

@@ -25,6 +25,7 @@ from hil.tune import (
     Plan,
     case_scenario,
     decode,
+    near_bounds,
     run_cost,
     tune,
     with_values,
@@ -112,6 +113,16 @@ def test_written_gains_are_the_ones_evaluated(tuned, tmp_path):
     write_gain_set(tmp_path / "set.toml", gains)
     read = tomllib.loads((tmp_path / "set.toml").read_text(encoding="utf-8"))
     assert Gains.model_validate(read) == gains
+
+
+def test_a_gain_at_the_edge_of_its_box_is_named():
+    """Where the box decided and not the cost; in the middle of every box nothing is said."""
+    middle = BASE
+    for outer, box in SEARCH.items():
+        middle = with_values(middle, outer, decode(box, [0.5] * len(box)))
+    assert near_bounds(middle) == []
+    (line,) = near_bounds(with_values(middle, "pid", {"kp_s3": SEARCH["pid"]["kp_s3"][2]}))
+    assert line.startswith("pid kp_s3 = 200")
 
 
 @pytest.mark.parametrize("outer", SEARCH)

@@ -54,3 +54,12 @@ def test_a_file_that_exists_is_not_written_over(tmp_path):
             command, ["--out", str(out)], standalone_mode=False, catch_exceptions=False
         )
     assert out.read_text() == "mine"
+
+
+def test_a_folder_that_is_not_there_is_named_before_the_search(tmp_path):
+    """A search of minutes does not end in a file that cannot be written."""
+    out = tmp_path / "none" / "set.toml"
+    with pytest.raises(BadInput, match="no folder"):
+        CliRunner().invoke(
+            command, ["--out", str(out)], standalone_mode=False, catch_exceptions=False
+        )

@@ -11,11 +11,14 @@ import numpy as np
 import pytest
 
 from hil.config.load import load_scenario
+from hil.ctrl_c import CtrlC
 from hil.errors import BadInput, RigFault
 from hil.record.journal import read_parquet, write_parquet
 from hil.record.schema import SAMPLE_COLUMNS
 from hil.replay.exact import COMMANDS, replay
 from hil.run import execute
+from hil.targets import open_rig
+from hil.types import Estimate
 from tests.replay.records import cut, record, record_on_wall_clock, spec, unclose
 
 GAIN = "control.gains.tuned.asg_ism.k1_s"
@@ -107,6 +110,39 @@ def test_ctrl_c_in_the_middle_of_a_tick_is_told_again(tmp_path: Path) -> None:
     report = replay(made.path)
     assert report.identical, report.first
     assert report.ending.outcome == "interrupted"
+
+
+def test_ctrl_c_reaches_a_host_that_is_always_late(tmp_path: Path) -> None:
+    """With 40 ms of work a tick of 33 ms the host never has to wait, and stops all the same."""
+    own = spec(tmp_path / "run")
+    twin = open_rig("twin", own.scenario, own.camera, own.seed)
+
+    def busy(t_host_s: float, _estimate: Estimate, _armed: bool) -> None:
+        while twin.now_s() < t_host_s + 0.04:
+            twin.wait(t_host_s + 0.04)
+
+    def press(t_s: float) -> None:
+        if 0.3 < t_s < 0.34:
+            signal.raise_signal(signal.SIGINT)
+
+    made = execute(own, press, rig=twin, publish=busy)
+    assert made.manifest.outcome == "interrupted"
+    assert made.samples["t_s"][-1] < 0.5
+    report = replay(made.path)
+    assert report.ending.outcome == "interrupted"
+
+
+def test_ctrl_c_is_kept_until_it_is_obeyed_and_the_second_is_not_kept() -> None:
+    """Pressed with no wait to come it is there for whoever asks next; twice is at once."""
+    with CtrlC() as ctrl_c:
+        signal.raise_signal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        ctrl_c.obey()
+    ctrl_c.obey()  # once for each time
+    with CtrlC():
+        signal.raise_signal(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
 
 
 def test_gain_changed_by_one_percent_is_told_apart(shared: Path) -> None:

@@ -47,7 +47,7 @@ def test_parameters_of_the_recorded_robot_are_found(fit: Fit) -> None:
     assert found["wheel radius"] == pytest.approx(1.10, abs=0.03)
     assert found["track"] == pytest.approx(0.90, abs=0.05)
     assert found["motor constants"] == pytest.approx(0.82, abs=0.06)
-    assert found["motor friction"] == pytest.approx(1.10, abs=0.3)
+    assert 0.6 < found["motor friction"] < 1.5
     assert -0.03 < fit.camera_tie_s < 0.06
 
 

@@ -125,7 +125,11 @@ void Fused::advance(double t_s) {
 
 void Fused::take_pose(double t_exposure_s, const Pose& pose, double sigma_xy_m,
                       double sigma_theta_rad) {
-  if (t_exposure_s <= t_anchor_s_) return;
+  if (!(t_exposure_s > t_anchor_s_)) return;  // a time that is no number too
+  if (!std::isfinite(pose.x_m + pose.y_m + pose.theta_rad + sigma_xy_m + sigma_theta_rad)) {
+    ++gated_total_;
+    return;
+  }
   advance(t_exposure_s);
   if (t_pose_s_) {
     correct(t_exposure_s, pose, sigma_xy_m, sigma_theta_rad);
