@@ -75,8 +75,8 @@ def render(
     )
     context = {
         "title": title or _title(comparisons),
-        "subtitle": _subtitle(comparisons),
-        "verdict": _verdict(comparisons),
+        "subtitle": _subtitle(comparisons, repeats),
+        "verdict": _verdict_of_repeats(repeats) if repeats else _verdict(comparisons),
         "basis_note": _basis_note(comparisons),
         "summary": _summary(comparisons),
         "parts": [_part(comparison) for comparison in comparisons],
@@ -101,9 +101,11 @@ def _title(comparisons: Sequence[Comparison]) -> str:
     return f"{' and '.join(laws)}: {names}"
 
 
-def _subtitle(comparisons: Sequence[Comparison]) -> str:
+def _subtitle(comparisons: Sequence[Comparison], repeats: Sequence[Repeats]) -> str:
     first = comparisons[0].entries[0].run.manifest
-    runs = len(_entries(comparisons))
+    repeated = {item.scenario_name for item in repeats}
+    single = [item for item in comparisons if item.scenario_name not in repeated]
+    runs = len(_entries(single)) + sum(sum(item.arms.values()) for item in repeats)
     started = first.start_time_utc.replace("T", " ")[:16]
     return f"{runs} runs on target {first.target}, camera {first.camera}, {started} UTC"
 
@@ -120,6 +122,24 @@ def _verdict(comparisons: Sequence[Comparison]) -> str:
         if not entry.holds
     )
     return f"{len(entries) - good} of {len(entries)} runs did not meet every requirement: {bad}."
+
+
+def _verdict_of_repeats(repeats: Sequence[Repeats]) -> str:
+    """Return how many of all repeats held, and which seed the table below shows."""
+    good = sum(sum(item.complete.values()) for item in repeats)
+    runs = sum(len(item.seeds) * len(item.complete) for item in repeats)
+    bad = ", ".join(
+        f"{item.scenario_name} {arm} {len(item.seeds) - count}"
+        for item in repeats
+        for arm, count in item.complete.items()
+        if count < len(item.seeds)
+    )
+    seeds = ", ".join(dict.fromkeys(str(item.seeds[0]) for item in repeats))
+    return (
+        f"{good} of {runs} paired runs completed and met every requirement of their scenario"
+        f"{f' (not: {bad})' if bad else ''}. This table is seed {seeds} alone; what all seeds say "
+        "stands under each scenario."
+    )
 
 
 def _basis_note(comparisons: Sequence[Comparison]) -> str:

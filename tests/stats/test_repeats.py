@@ -118,6 +118,9 @@ def test_report_shows_the_intervals(four_arms: list[RunRecord]) -> None:
     assert found.repeats is not None
     page = render([found.comparison], command="test", repeats=[found.repeats])
     assert "Repeats, paired by seed" in page
+    assert "12 runs on target twin" in page
+    assert " of 12 paired runs completed" in page
+    assert "This table is seed 1 alone" in page
     assert "95 % interval" in page
     json.dumps(found.to_json(), allow_nan=False)
     assert {entry.run.manifest.seed for entry in found.comparison.entries} == {1}
