@@ -58,12 +58,21 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
     tree["board"] = board_defaults() | tree.get("board", {})
     scenario = build(Scenario, tree, name_or_path)
     if overrides:
-        full = scenario.model_dump(mode="json")
-        for text in overrides:
-            set_value(full, text)
-        scenario = build(Scenario, full, "--set")
+        return with_overrides(scenario, overrides)
     check_board(scenario.board)
     return scenario
+
+
+def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
+    """Return the scenario with KEY=VALUE texts applied; raises BadInput."""
+    if not overrides:
+        return scenario
+    tree = scenario.model_dump(mode="json")
+    for text in overrides:
+        set_value(tree, text)
+    changed = build(Scenario, tree, "--set")
+    check_board(changed.board)
+    return changed
 
 
 def board_defaults() -> dict[str, float]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from hil.config.load import build, check_board, set_value
+from hil.config.load import build, with_overrides
 from hil.config.scenario import Scenario
 from hil.errors import BadInput, RigFault
 from hil.record import layout
@@ -214,13 +214,7 @@ def replay(
 
 def _changed(recorded: Scenario, overrides: Sequence[str]) -> Scenario:
     """Return the scenario of a shadow; what the record alone decides cannot be changed."""
-    if not overrides:
-        return recorded
-    tree = recorded.model_dump(mode="json")
-    for text in overrides:
-        set_value(tree, text)
-    changed = build(Scenario, tree, "--set")
-    check_board(changed.board)
+    changed = with_overrides(recorded, overrides)
     for key in ("duration_s", "start", "mismatch", "disturbances", "faults"):
         if getattr(changed, key) != getattr(recorded, key):
             raise BadInput(f"--set {key}: happened in the record and cannot be changed in a replay")

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hil.config.load import build, check_board, set_value
+from hil.config.load import build, with_overrides
 from hil.config.scenario import Scenario, StartPose
 from hil.metrics import BY_NAME, compute
 from hil.record import layout
@@ -111,7 +111,7 @@ def what_if(
     )
     law = outer or manifest.outer
     own = _runs(fitted, manifest.outer, manifest.inner)
-    other = _runs(_changed(fitted, overrides), law, manifest.inner)
+    other = _runs(with_overrides(fitted, overrides), law, manifest.inner)
     names = list(HEADLINES)
     values = [[_figures(run) for run in runs] for runs in (own, other)]
     return WhatIf(
@@ -126,17 +126,6 @@ def what_if(
         },
         ended_early=(_early(own), _early(other)),
     )
-
-
-def _changed(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
-    if not overrides:
-        return scenario
-    tree = scenario.model_dump(mode="json")
-    for text in overrides:
-        set_value(tree, text)
-    changed = build(Scenario, tree, "--set")
-    check_board(changed.board)
-    return changed
 
 
 def _runs(scenario: Scenario, outer: str, inner: str) -> list[RunRecord]:

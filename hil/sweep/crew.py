@@ -33,9 +33,8 @@ def in_processes(
     """Yield the results of all jobs; raises RigFault when one job's worker dies again and again."""
     todo = deque(jobs)
     crashes: Counter[str] = Counter()
-    context = multiprocessing.get_context("spawn")
     while todo:
-        pool = ProcessPoolExecutor(min(workers, len(todo)), context, _leave_ctrl_c_to_parent)
+        pool = _workers(min(workers, len(todo)))
         running: dict[Future[Result], Job] = {}
         try:
             yield from _hand_out(pool, function, todo, running, _AHEAD * workers)
@@ -78,8 +77,7 @@ class Pool:
 
     def __init__(self, function: Callable[[Job], Result], workers: int) -> None:
         self._function = function
-        context = multiprocessing.get_context("spawn")
-        self._pool = ProcessPoolExecutor(workers, context, _leave_ctrl_c_to_parent)
+        self._pool = _workers(workers)
 
     def __enter__(self) -> Self:
         """Return the pool."""
@@ -101,6 +99,11 @@ class Pool:
                 "a worker process died; out of memory? fewer --workers need less"
             ) from None
         return results
+
+
+def _workers(count: int) -> ProcessPoolExecutor:
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(count, context, _leave_ctrl_c_to_parent)
 
 
 def _leave_ctrl_c_to_parent() -> None:
