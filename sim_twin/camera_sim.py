@@ -24,7 +24,7 @@ from hil.config.camera import (
     ShadowEdgeConfig,
     TagConfig,
 )
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from sim_twin import _native
 
 TEXTURE_SIZE = 800

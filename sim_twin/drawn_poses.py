@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from pydantic import Field
 
 from hil.config.base import Section
-from hil.types import Pose, PoseMeasurement, wrap_pi
+from hil.core.types import Pose, PoseMeasurement, wrap_pi
 
 if TYPE_CHECKING:
     from hil.config.camera import CameraConfig

@@ -9,8 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hil.errors import BadInput
-from hil.firmware import Build, build, find_toolchain
+from hil.board.build import Build, build, find_toolchain
+from hil.core.errors import BadInput
 from sim_twin.twin import FrameMaker, Twin, TwinSetup
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import re
 import subprocess
 from dataclasses import dataclass
 
-from hil.firmware import Build, Toolchain, find_toolchain
+from hil.board.build import Build, Toolchain, find_toolchain
 
 FLASH_WORDS = 128 * 1024
 # Part -> its functions as file:function. Interrupts are told by their vector besides, so that the

@@ -1,6 +1,6 @@
 """The simulated rig: robot, board, link and camera in lockstep on a virtual host clock.
 
-Twin stands in at the byte stream and at the camera frame (`hil.targets.base.Rig`). Time moves only
+Twin stands in at the byte stream and at the camera frame (`hil.core.rig.Rig`). Time moves only
 in `wait`; nothing here reads a real clock. Host time is virtual time + HOST_START_S.
 """
 
@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from random import Random
 from typing import TYPE_CHECKING, Protocol
 
-from hil.errors import RigFault
-from hil.targets.base import Frame, Truth
-from hil.types import Pose
+from hil.core.errors import RigFault
+from hil.core.rig import Frame, Truth
+from hil.core.types import Pose
+from sim_twin.camera_timing import Exposure, Shutter, Span
 from sim_twin.drawn_poses import DrawnPoses, PoseTuple, load_localiser_error
 from sim_twin.link_model import Channel, Serialiser
 from sim_twin.setup import make_kernel
-from sim_twin.shutter import Exposure, Shutter, Span
 
 if TYPE_CHECKING:
     import numpy as np
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from hil.config.events import Disturbance, Fault
     from hil.config.link import LinkConfig
     from hil.config.robot import RobotConfig
-    from hil.targets.base import ByteStream
+    from hil.core.rig import ByteStream
 
 # No clock of a real rig starts at zero; whoever mixes up host, board and camera time shall notice.
 HOST_START_S = 1000.0

@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from vision.camera import CameraModel
 
 Array = NDArray[np.float64]

@@ -2,7 +2,7 @@
 
 The sensor is linear. Each mark has a *response*: a weighted sum of blue, green and red that is zero
 for grey and largest for the mark's own colour, so that floor, shadows and reflected lamps vanish
-from it. Near a prediction the marks are measured at once (`vision.rim`); without one, blobs of the
+from it. Near a prediction the marks are measured at once (`vision.disc_fit`); without one, blobs of the
 right size are looked for in a coarse image, and every two of them that may be the robot are measured
 in the same way. What is accepted must have the marks' size, their distance and dark ground about
 them.
@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.config.camera import MarkConfig, MarksConfig
-from hil.types import Pose, PoseMeasurement, wrap_pi
+from hil.core.types import Pose, PoseMeasurement, wrap_pi
 from vision.camera import CameraModel
-from vision.rim import Disc, Marks, Point, RimFitter
+from vision.disc_fit import Disc, Marks, Point, RimFitter
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]

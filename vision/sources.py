@@ -22,10 +22,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.errors import BadInput, RigFault
-from hil.targets.base import Frame
-from hil.targets.frame_queue import FrameQueue
+from hil.core.errors import BadInput, RigFault
+from hil.core.rig import Frame
 from vision import cv_compat
+from vision.frame_queue import FrameQueue
 
 Image = NDArray[np.uint8]
 
@@ -71,7 +71,7 @@ LOCKS = {
 
 
 class LiveCamera:
-    """A camera in real time, as `hil.targets.frames.FrameSource`.
+    """A camera in real time, as `hil.rigs.frames.FrameSource`.
 
     Exposure, gain, white balance and focus are locked: at the given values, else at those the
     automatics settled on. `locked` says at what, `unlocked` which the driver did not let be.

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.config.camera import TagConfig
-from hil.types import Pose, PoseMeasurement, wrap_pi
+from hil.core.types import Pose, PoseMeasurement, wrap_pi
 from vision import cv_compat
 from vision.camera import CameraModel
-from vision.rigid import fit_pose
+from vision.pose_fit import fit_pose
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.types import Pose, PoseMeasurement, wrap_pi
+from hil.core.types import Pose, PoseMeasurement, wrap_pi
 
 Image = NDArray[np.uint8]
 

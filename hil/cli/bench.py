@@ -41,7 +41,7 @@ def command(what: str, runs: int, candidates: int | None, as_json: bool) -> None
 
 
 def _measure_vision(as_json: bool) -> None:
-    from hil import bench_vision
+    from hil.tools import bench_vision
 
     def progress(text: str) -> None:
         click.echo(text, err=True)
@@ -58,7 +58,7 @@ def _measure_firmware(as_json: bool) -> None:
     from dataclasses import asdict
 
     from hil.config.load import load_scenario
-    from sim_twin import firmware_cost
+    from hil.tools import firmware_cost
 
     cost = firmware_cost.measure(load_scenario("scenario-1").robot)
     if as_json:
@@ -78,7 +78,7 @@ def _measure_firmware(as_json: bool) -> None:
 
 
 def _measure_speed(runs: int, as_json: bool) -> None:
-    from hil import bench
+    from hil.tools import bench
 
     found = bench.figures(runs)
     if as_json:
@@ -95,7 +95,7 @@ def _measure_speed(runs: int, as_json: bool) -> None:
 
 
 def _compare_wheels(robots: int, as_json: bool) -> None:
-    from hil import wheel_bench
+    from hil.study import wheel_bench
 
     found = wheel_bench.table({}, wheel_bench.held_out(robots))
     if as_json:
@@ -113,7 +113,7 @@ def _compare_wheels(robots: int, as_json: bool) -> None:
 
 
 def _tune_wheels(candidates: int, as_json: bool) -> None:
-    from hil import wheel_tune
+    from hil.study import wheel_tune
 
     def progress(what: str, done: int, candidates: int, best: float) -> None:
         click.echo(f"\r{what}: {done} of {candidates}, cost {best:.4f} ", nl=False, err=True)

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 import click
 
 from hil.cli.options import json_option, print_json
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from hil.bringup.result import Check, Report, Side
-    from hil.bringup.wiring import Seen
     from hil.config.robot import RobotConfig
+    from hil.tools.bringup.result import Check, Report, Side
+    from hil.tools.bringup.wiring import Seen
 
 _SEEN = "[lf] left forward, [lb] left backward, [rf] right forward, [rb] right backward, [n] none"
 
@@ -42,10 +42,10 @@ def command(
     and top speed, forward and backward; then counts a turn. Status 1 when a check fails. The wheels
     stand whenever a question is asked, and at the end.
     """
-    from hil.bringup.robot_file import check_out, write_robot_file
     from hil.config.load import load_robot
-    from hil.targets import SIMULATED
-    from hil.targets.serial import parse_target
+    from hil.rigs.opening import SIMULATED
+    from hil.rigs.serial import parse_target
+    from hil.tools.bringup.robot_file import check_out, write_robot_file
 
     if target in SIMULATED:
         raise BadInput(
@@ -72,9 +72,9 @@ def command(
 
 
 def _run(device: str, baud: int, believed: RobotConfig, turns: float, yes: bool) -> Report:
-    from hil.bringup.procedure import BringUp, Plan
     from hil.config.control import OuterLimits
-    from hil.targets.serial import SerialRig
+    from hil.rigs.serial import SerialRig
+    from hil.tools.bringup.procedure import BringUp, Plan
 
     limits = OuterLimits()
     rim_m_s = limits.eta1_max_m_s + limits.theta_dot_max_rad_s * believed.track_m / 2.0
@@ -128,7 +128,7 @@ class Person:
 
     def seen(self, driven: Side) -> Seen | None:
         """Ask which wheels turned and which way."""
-        from hil.bringup.wiring import Seen
+        from hil.tools.bringup.wiring import Seen
 
         sides: dict[str, Seen | None] = {
             "lf": Seen("left"), "lb": Seen("left", forward=False), "rf": Seen("right"),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hil.cli.options import json_option, print_json
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 
 if TYPE_CHECKING:
     from vision.calibration.boards import Board

@@ -10,7 +10,7 @@ import click
 from hil.cli.options import json_option, print_json
 
 if TYPE_CHECKING:
-    from hil.experiment import Study
+    from hil.study.experiment import Study
 
 
 @click.command("compare")
@@ -34,11 +34,11 @@ def command(
     Runs of two or more seeds per law, the same ones for each, are also compared as repeats: paired
     by seed, with 95 % intervals.
     """
-    from hil.experiment import study
     from hil.record.manifest import command_line
     from hil.record.reader import read_run
     from hil.report.csv_table import write_csv
     from hil.report.html import write_report
+    from hil.study.experiment import study
 
     records = [read_run(run) for run in runs]
     found = study(records)

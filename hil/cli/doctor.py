@@ -12,7 +12,7 @@ def command(as_json: bool) -> None:
 
     Ends with status 0 whatever is missing: not every target needs every tool.
     """
-    from hil import doctor
+    from hil.tools import doctor
 
     findings = doctor.examine()
     if as_json:

@@ -52,7 +52,11 @@ def command(
     The same command with the same --out takes an interrupted experiment up where it stopped.
     """
     from hil.config.deck import load_deck
-    from hil.experiment import (
+    from hil.record.manifest import command_line
+    from hil.record.reader import read_run
+    from hil.report.html import write_report
+    from hil.runs.execute import exit_status, new_folder
+    from hil.study.experiment import (
         Conditions,
         circle_study,
         claim,
@@ -61,10 +65,6 @@ def command(
         run_name,
         study_by_scenario,
     )
-    from hil.record.manifest import command_line
-    from hil.record.reader import read_run
-    from hil.report.html import write_report
-    from hil.run import exit_status, new_folder
 
     conditions = Conditions(target, camera, inner, seed, repeats, overrides, command_line())
     folder = out or new_folder("experiment")

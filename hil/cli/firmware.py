@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 
 _FILE = click.Path(path_type=Path, dir_okay=False)
 _port_option = click.option(
@@ -26,9 +26,9 @@ def command() -> None:
 @click.option("--fresh", is_flag=True, help="Compile even when nothing has changed.")
 def build(out: Path | None, fresh: bool) -> int:
     """Compile the sketch to ELF and HEX and print its size."""
-    from hil import firmware
+    from hil.board import build
 
-    made = firmware.build(out, fresh=fresh)
+    made = build.build(out, fresh=fresh)
     click.echo(f"build {made.build_id}: {made.elf} and {made.hex.name}")
     click.echo(f"flash {made.flash_bytes} bytes, static RAM {made.ram_bytes} bytes")
     for line in made.over_budget():
@@ -40,10 +40,10 @@ def build(out: Path | None, fresh: bool) -> int:
 @click.argument("port")
 def upload(port: str) -> None:
     """Build the sketch and write it to the board on PORT."""
-    from hil import firmware
+    from hil.board import build
 
-    made = firmware.build()
-    firmware.upload(made, port)
+    made = build.build()
+    build.upload(made, port)
     click.echo(f"build {made.build_id} is on the board at {port}")
 
 
@@ -51,7 +51,7 @@ def upload(port: str) -> None:
 @click.option("--check", is_flag=True, help="Change nothing; status 1 when a file is stale.")
 def codegen(check: bool) -> int:
     """Generate the MAVLink dialect for both worlds from hil/wire/hil.xml."""
-    from hil.wire import codegen as generator
+    from hil.board import codegen as generator
 
     if check:
         stale = generator.differences()
@@ -75,8 +75,8 @@ def list_parameters(target: str) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from hil._firmware import parameter_table
-    from hil.board_parameters import open_board
+    from hil.board._firmware import parameter_table
+    from hil.tools.board_parameters import open_board
 
     known = {entry.name: entry for entry in parameter_table()}
     table = Table("name", "value", "from", "to", "unit", "meaning")
@@ -98,8 +98,8 @@ def list_parameters(target: str) -> None:
 @click.option("--store", is_flag=True, help="Keep them in the EEPROM as well.")
 def set_parameters(target: str, settings: tuple[str, ...], store: bool) -> None:
     """Set parameters within their bounds; all are checked before the first is sent."""
-    from hil.board_parameters import open_board
     from hil.config.load import check_board
+    from hil.tools.board_parameters import open_board
 
     values: dict[str, float] = {}
     for text in settings:
@@ -121,7 +121,7 @@ def set_parameters(target: str, settings: tuple[str, ...], store: bool) -> None:
 @click.argument("file", type=_FILE)
 def save_parameters(target: str, file: Path) -> None:
     """Write the board's parameters to FILE, as the [board] table of a scenario."""
-    from hil.board_parameters import open_board, write_file
+    from hil.tools.board_parameters import open_board, write_file
 
     with open_board(target) as board:
         write_file(file, board.parameters)
@@ -133,7 +133,7 @@ def save_parameters(target: str, file: Path) -> None:
 @click.argument("file", type=_FILE)
 def compare_parameters(target: str, file: Path) -> int:
     """Print what differs between the board and FILE; status 1 when anything does."""
-    from hil.board_parameters import compare, open_board, read_file
+    from hil.tools.board_parameters import compare, open_board, read_file
 
     wanted = read_file(file)
     with open_board(target) as board:

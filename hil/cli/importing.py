@@ -18,9 +18,9 @@ from hil.cli.run import print_summary, summary
 @json_option
 def command(log: Path, mapping: Path | None, out: Path | None, as_json: bool) -> None:
     """Make a run record of LOG, a MAVLink .tlog or a CSV file, that compare and view accept."""
-    from hil.foreign import import_log
+    from hil.record.log_import import import_log
     from hil.record.manifest import command_line
-    from hil.run import new_folder
+    from hil.runs.execute import new_folder
 
     record = import_log(log, mapping, out or new_folder(log.stem), command_line())
     if as_json:

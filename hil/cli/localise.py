@@ -34,7 +34,7 @@ def command(
     Says in how many frames the robot was seen, why not in the others, and how well it fitted.
     A video that is cut off in mid-frame is refused, and nothing is written.
     """
-    from hil.localise import Outputs, localise, summary_text
+    from hil.tools.localise import Outputs, localise, summary_text
 
     document = localise(source, camera_file, tag_text, Outputs(out, overlay))
     if as_json:

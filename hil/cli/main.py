@@ -10,7 +10,7 @@ from typing import NoReturn
 import click
 
 from hil import __version__
-from hil.errors import HilError
+from hil.core.errors import HilError
 
 # name -> (module, one-line help). The text stands here so that `hil --help` imports no command.
 COMMANDS = {

@@ -10,7 +10,7 @@ import click
 from hil.cli.options import LAWS, json_option, print_json, set_option
 
 if TYPE_CHECKING:
-    from hil.replay.exact import ReplayReport
+    from hil.replays.exact import ReplayReport
 
 
 @click.command("replay")
@@ -52,11 +52,11 @@ def command(
     """
     from hil.cli.progress import run_progress
     from hil.record.manifest import read_manifest
-    from hil.replay.elf import elf as elf_firmware
-    from hil.replay.exact import replay
-    from hil.replay.firmware import core, replay_wheels
-    from hil.replay.output import claim_folder, write_output
-    from hil.replay.what_if import what_if
+    from hil.replays.elf import elf as elf_firmware
+    from hil.replays.exact import replay
+    from hil.replays.firmware import core, replay_wheels
+    from hil.replays.output import claim_folder, write_output
+    from hil.replays.what_if import what_if
 
     duration_s = float(read_manifest(run).scenario.get("duration_s", 0.0))
     through = elf_firmware() if elf else core()

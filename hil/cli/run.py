@@ -25,7 +25,7 @@ from hil.cli.progress import run_progress
 
 if TYPE_CHECKING:
     from hil.record.reader import RunRecord
-    from hil.session import Publish
+    from hil.runs.session import Publish
 
 
 @click.command("run")
@@ -64,7 +64,7 @@ def command(
     """
     from hil.config.load import load_scenario
     from hil.record.manifest import command_line
-    from hil.run import RunSpec, camera_for, execute, exit_status, new_folder
+    from hil.runs.execute import RunSpec, camera_for, execute, exit_status, new_folder
 
     resolved = load_scenario(scenario, overrides)
     spec = RunSpec(
@@ -100,7 +100,7 @@ def _ground_stations(address: str | None) -> Iterator[Publish | None]:
     if address is None:
         yield None
         return
-    from hil.bridge import UdpBridge
+    from hil.tools.bridge import UdpBridge
 
     bridge = UdpBridge(address)
     try:

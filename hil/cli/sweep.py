@@ -29,11 +29,11 @@ def command(
     """
     from hil.cli.progress import job_progress
     from hil.record.manifest import command_line
-    from hil.run import new_folder
-    from hil.sweep.answers import documents, outcomes_of, sentences
-    from hil.sweep.campaign import load_campaign
-    from hil.sweep.maps import write_page
-    from hil.sweep.work import run_campaign
+    from hil.runs.execute import new_folder
+    from hil.study.campaign.findings import documents, outcomes_of, sentences
+    from hil.study.campaign.maps import write_page
+    from hil.study.campaign.plan import load_campaign
+    from hil.study.campaign.work import run_campaign
 
     campaign = load_campaign(file)
     folder = out or new_folder(f"sweep-{campaign.file.name}")

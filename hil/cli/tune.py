@@ -14,12 +14,12 @@ from hil.cli.options import json_option, print_json
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from hil.analysis.metrics import Metric
+    from hil.analysis.stats import Paired
     from hil.cli.progress import Stage
     from hil.config.control import Gains
-    from hil.held_out import Verdict
-    from hil.metrics import Metric
-    from hil.stats import Paired
-    from hil.tune import Figures, Trial
+    from hil.study.tune import Figures, Trial
+    from hil.study.tuning_verdict import Verdict
 
 
 @click.command("tune")
@@ -53,11 +53,11 @@ def command(
     """
     from hil.cli.progress import stage_progress
     from hil.config.control import ControlConfig
-    from hil.errors import BadInput
-    from hil.held_out import held_out_trials, judge, with_verdict
+    from hil.core.errors import BadInput
     from hil.record.manifest import git_revision
-    from hil.sweep.crew import Pool
-    from hil.tune import OnTarget, Plan, tune, write_gain_set
+    from hil.study.campaign.workers import Pool
+    from hil.study.tune import OnTarget, Plan, tune, write_gain_set
+    from hil.study.tuning_verdict import held_out_trials, judge, with_verdict
 
     if out.exists():
         raise BadInput(f"--out {out}: exists already; name a new file")
@@ -99,7 +99,7 @@ def _print(out: Path, gains: Gains, verdict: Verdict) -> None:
     """Write what was found and how it was judged to stdout."""
     from rich.console import Console
 
-    from hil.tune import SEARCH, near_bounds
+    from hil.study.tune import SEARCH, near_bounds
 
     console = Console(highlight=False)
     for law in SEARCH:
@@ -118,8 +118,8 @@ def _table(verdict: Verdict) -> Table:
     """Return the paired differences, a row per figure and a column per scenario."""
     from rich.table import Table
 
-    from hil.held_out import ALL_SCENARIOS
-    from hil.metrics import BY_NAME
+    from hil.analysis.metrics import BY_NAME
+    from hil.study.tuning_verdict import ALL_SCENARIOS
 
     seeds = f"seeds {verdict.seeds[0]} to {verdict.seeds[-1]}"
     table = Table(

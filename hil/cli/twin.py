@@ -48,8 +48,8 @@ def serve(
     """  # noqa: D301 - \b is click's mark for a verbatim paragraph
     # `hil --help` must not load the twin.
     from hil.config.load import load_scenario
-    from hil.serve import TwinServer
-    from hil.targets import open_rig
+    from hil.rigs.opening import open_rig
+    from hil.tools.serve_twin import TwinServer
 
     rig = open_rig("twin", load_scenario(scenario, overrides), camera, seed)
     server = TwinServer(rig, pty, frames)

@@ -96,7 +96,7 @@ class Gains(Section):
 class GainSets(Section):
     """The named sets of hil/data/gains; values given in a scenario are laid over those files."""
 
-    tuned: Gains = Field(description="found by `hil.tune`, the same budget for both laws")
+    tuned: Gains = Field(description="found by `hil.study.tune`, the same budget for both laws")
     thesis: Gains = Field(description="table 8.2 as read in docs/control.md")
 
     @model_validator(mode="before")

@@ -14,10 +14,10 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from hil._firmware import parameter_table
+from hil.board._firmware import parameter_table
 from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 
 Tree = dict[str, Any]
 Model = TypeVar("Model", bound=BaseModel)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import cv2
 
-from hil.errors import RigFault
+from hil.core.errors import RigFault
 from hil.record.reader import picture_name
 
 if TYPE_CHECKING:

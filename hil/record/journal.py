@@ -17,7 +17,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from hil.record.schema import Column
 
 if TYPE_CHECKING:

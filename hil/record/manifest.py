@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from hil.record import layout
 from hil.record.schema import SCHEMA_VERSION
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from hil import metrics
+from hil.analysis import metrics
 from hil.record.reader import Event, RunRecord
 from hil.record.schema import FRAME_NAMES, SAMPLE_NAMES
 

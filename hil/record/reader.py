@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hil import metrics
-from hil.errors import BadInput
+from hil.analysis import metrics
+from hil.core.errors import BadInput
 from hil.record import layout
 from hil.record.journal import Columns, read_journal, read_parquet
 from hil.record.manifest import Manifest, file_entry, read_manifest

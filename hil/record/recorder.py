@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hil import metrics
-from hil.errors import BadInput
+from hil.analysis import metrics
+from hil.core.errors import BadInput
 from hil.record import layout
 from hil.record.camera import CameraKeeper
 from hil.record.journal import Columns, Journal, read_journal, write_parquet

@@ -17,7 +17,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from hil import metrics
+from hil.analysis import metrics
 from hil.record.reader import RunRecord
 
 if TYPE_CHECKING:

@@ -17,10 +17,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hil.errors import BadInput, RigFault
+from hil.core.errors import BadInput, RigFault
 
 if TYPE_CHECKING:
-    from hil.targets.base import ByteStream, Frame, Rig, Truth
+    from hil.core.rig import ByteStream, Frame, Rig, Truth
 
 _HEADER = json.dumps({"format": "hil-tape-1"}).encode() + b"\n"
 _CLOCK = struct.Struct("<cd")
@@ -90,7 +90,7 @@ class TapedStream:
 class TapedRig:
     """A rig whose every answer is taped; otherwise it is the rig itself.
 
-    `obey` may raise KeyboardInterrupt; it is called at each wait, before it (`hil.ctrl_c`).
+    `obey` may raise KeyboardInterrupt; it is called at each wait, before it (`hil.runs.interruption`).
     """
 
     def __init__(self, rig: Rig, tape: TapeWriter, obey: Callable[[], None]) -> None:

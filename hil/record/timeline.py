@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from hil.rows import frame_row
+from hil.record.tick_rows import frame_row
 
 if TYPE_CHECKING:
+    from hil.core.rig import Frame
+    from hil.core.types import PoseMeasurement
     from hil.record.memory import RunSink
-    from hil.targets.base import Frame
-    from hil.types import PoseMeasurement
 
 
 class Timeline:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 
 _STAMP = struct.Struct(">Q")
 _MAGIC_2 = 0xFD

@@ -17,7 +17,7 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from hil._firmware import Parameter, parameter_table
+from hil.board._firmware import Parameter, parameter_table
 from hil.config.control import Gains
 from hil.config.load import UNITS, unit_of
 from hil.config.scenario import Scenario

@@ -17,7 +17,7 @@ Pairs = Sequence[tuple[float, float]]
 
 
 class Signals(Protocol):
-    """Signals of one ideal run, one entry a control step (`hil.ideal.IdealRun`)."""
+    """Signals of one ideal run, one entry a control step (`hil.study.ideal_circle.IdealRun`)."""
 
     @property
     def t_s(self) -> Sequence[float]:

@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from hil.errors import BadInput
-from hil.metrics import BY_NAME, METRICS, Figures, Metric, Verdict, check
-from hil.report.tiers import tier_gap
+from hil.analysis.metrics import BY_NAME, METRICS, Figures, Metric, Verdict, check
+from hil.core.errors import BadInput
+from hil.report.target_gap import tier_gap
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from hil import metrics
+from hil.analysis import metrics
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,8 +13,8 @@ import cv2
 import jinja2
 from markupsafe import Markup
 
-from hil.errors import BadInput
-from hil.metrics import BY_NAME, METRICS
+from hil.analysis.metrics import BY_NAME, METRICS
+from hil.core.errors import BadInput
 from hil.record.manifest import replace_file
 from hil.report import figures as draw
 from hil.report.assumptions import Assumption, assumptions, gain_assumptions

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hil.metrics import BY_NAME, METRICS, Metric
+from hil.analysis.metrics import BY_NAME, METRICS, Metric
+from hil.analysis.stats import Adjusted, Paired, adjusted, paired
 from hil.report.compare import differences
-from hil.stats import Adjusted, Paired, adjusted, paired
 
 if TYPE_CHECKING:
     from rich.table import Table

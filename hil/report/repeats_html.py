@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
-from hil.metrics import BY_NAME, METRICS
+from hil.analysis.metrics import BY_NAME, METRICS
+from hil.analysis.stats import Paired
 from hil.report import figures as draw
 from hil.report.compare import HEADLINES
 from hil.report.repeats import Contrast, Repeats
-from hil.stats import Paired
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,7 +1,7 @@
 """The host's end of the link: frames to values, set-points out, clocks tied, board brought up.
 
 Nothing here blocks or reads a clock: `poll(t_host_s)` takes what has arrived, runs the timers and
-moves the procedure under way (hil.wire.bringup) one step on, the same in virtual and in wall time.
+moves the procedure under way (hil.wire.handshake) one step on, the same in virtual and in wall time.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from hil.clocks import BoardClock
-from hil.errors import RigFault
-from hil.targets.base import ByteStream
-from hil.types import WheelSample
+from hil.core.clocks import BoardClock
+from hil.core.errors import RigFault
+from hil.core.rig import ByteStream
+from hil.core.types import WheelSample
 from hil.wire import dialect
 from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM, FrameReader, FrameWriter
 
@@ -108,7 +108,7 @@ class BoardLink:
 
     @property
     def busy(self) -> bool:
-        """True while a procedure (hil.wire.bringup) is under way."""
+        """True while a procedure (hil.wire.handshake) is under way."""
         return self._procedure is not None
 
     @property

@@ -5,7 +5,7 @@
 
 #include <array>
 
-#include "pair.hpp"
+#include "two_lanes.hpp"
 
 namespace twin {
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hil.bringup.procedure import BringUp, Plan
-from hil.bringup.result import Check, Report, Side
-from hil.bringup.wiring import Seen
 from hil.config.camera import CameraConfig
 from hil.config.events import Fault
 from hil.config.link import LinkConfig
-from hil.types import Pose
+from hil.core.types import Pose
+from hil.tools.bringup.procedure import BringUp, Plan
+from hil.tools.bringup.result import Check, Report, Side
+from hil.tools.bringup.wiring import Seen
 from sim_twin import _native
 from sim_twin.twin import Twin, TwinSetup
 from tests.twin.rigs import robot

@@ -9,11 +9,11 @@ import time
 import pytest
 from click.testing import CliRunner
 
-from hil.bringup import measure
 from hil.cli.bringup import command
 from hil.config.events import Fault
-from hil.errors import BadInput, RigFault
-from hil.serve import TwinServer
+from hil.core.errors import BadInput, RigFault
+from hil.tools.bringup import measure
+from hil.tools.serve_twin import TwinServer
 from tests.bringup.rigs import SPEEDS, lifted
 
 

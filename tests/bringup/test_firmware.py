@@ -7,7 +7,7 @@ import pytest
 from hil.config.camera import CameraConfig
 from hil.config.events import Fault
 from hil.config.link import LinkConfig
-from hil.types import Pose
+from hil.core.types import Pose
 from sim_twin.pil import Pil
 from sim_twin.twin import TwinSetup
 from tests.bringup.rigs import bring_up

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from hil import _firmware
-from hil.bringup.drive import OPEN_LOOP
-from hil.bringup.result import Side
+from hil.board import _firmware
 from hil.cli.bringup import Nobody
 from hil.config.events import Fault
 from hil.config.link import LinkConfig
-from hil.errors import RigFault
-from hil.wire import bringup
+from hil.core.errors import RigFault
+from hil.tools.bringup.drive import OPEN_LOOP
+from hil.tools.bringup.result import Side
+from hil.wire import handshake
 from hil.wire.link import BoardLink
 from sim_twin.twin import Twin
 from tests.bringup.rigs import SPEEDS, Onlooker, bring_up, lifted
@@ -61,7 +61,7 @@ def test_the_board_is_left_as_it_was():
     twin = lifted()
     bring_up(twin)
     link = BoardLink(twin.stream)
-    bringup.finish(link, twin, bringup.connect(link, {}))
+    handshake.finish(link, twin, handshake.connect(link, {}))
     assert not link.armed
     defaults = {entry.name: entry.default for entry in _firmware.parameter_table()}
     assert link.parameters == pytest.approx(defaults)
@@ -206,7 +206,7 @@ def test_ctrl_c_stops_the_wheels():
     assert rig.pressed
     assert_stops(twin)
     link = BoardLink(twin.stream)
-    bringup.finish(link, twin, bringup.connect(link, {}))
+    handshake.finish(link, twin, handshake.connect(link, {}))
     assert link.state_name == "SAFE (STOP_COMMAND)"
     defaults = {entry.name: entry.default for entry in _firmware.parameter_table()}
     assert link.parameters["FF_GAIN"] == pytest.approx(defaults["FF_GAIN"])

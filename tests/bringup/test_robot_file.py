@@ -6,10 +6,10 @@ import tomllib
 
 import pytest
 
-from hil.bringup.result import Measured
-from hil.bringup.robot_file import check_out, write_robot_file
 from hil.config.load import load_robot, load_scenario
-from hil.errors import BadInput
+from hil.core.errors import BadInput
+from hil.tools.bringup.result import Measured
+from hil.tools.bringup.robot_file import check_out, write_robot_file
 
 SPEEDS = {
     "dead_duty_forward": (0.15, 0.16),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from hil.bringup.result import Check
-from hil.bringup.wiring import Moved, Seen, judge
+from hil.tools.bringup.result import Check
+from hil.tools.bringup.wiring import Moved, Seen, judge
 
 
 def faults(checks: list[Check]) -> list[tuple[str, str]]:

@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from tests.calibration.render import at_floor, board_image
 from vision.calibration.boards import Charuco, Chessboard, parse_board
 from vision.calibration.printing import lay_out, to_pdf, to_svg, write_sheet

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from vision.calibration.colours import Sample, chromaticity, grow, learn_colours, read_samples
 
 RED, GREEN, ORANGE = (30, 25, 150), (30, 110, 25), (25, 60, 150)

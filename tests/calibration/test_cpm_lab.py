@@ -16,12 +16,12 @@ import numpy as np
 import pytest
 
 from hil.config.control import EstimatorConfig
-from hil.estimator.camera_only import CameraOnly
-from hil.estimator.geometry import BelievedGeometry
-from hil.types import PoseMeasurement
+from hil.control.estimators.camera_only import CameraOnly
+from hil.control.estimators.geometry import BelievedGeometry
+from hil.core.types import PoseMeasurement
 from vision.calibration.floor import FloorOptions, calibrate_floor
 from vision.calibration.points import PointPairs
-from vision.rigid import fit_pose
+from vision.pose_fit import fit_pose
 
 DATA = Path(__file__).parent.parent / "data" / "cpm_lab"
 SIZE = (2048, 2048)

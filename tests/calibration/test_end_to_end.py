@@ -13,8 +13,8 @@ from hil.cli.calibrate import command as calibrate
 from hil.cli.localise import command as localise
 from hil.config.camera import CameraConfig
 from hil.config.load import load_scenario
-from hil.errors import BadInput
-from hil.types import wrap_pi
+from hil.core.errors import BadInput
+from hil.core.types import wrap_pi
 from sim_twin.camera_sim import RenderedCamera
 from tests.calibration.render import LENS, TagFloor, board_image, hand_held
 from vision.calibration.boards import parse_board

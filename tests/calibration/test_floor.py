@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from tests.calibration.render import TagFloor, at_floor, board_image
 from vision.calibration.boards import parse_board
 from vision.calibration.floor import FloorOptions, calibrate_floor, error_budget

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from vision.calibration.latency import measure_latency, switching_times
 
 RATE_HZ = 30.0

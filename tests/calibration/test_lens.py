@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from tests.calibration.render import LENS, board_image, hand_held
 from vision import cv_compat
 from vision.calibration.boards import parse_board

@@ -9,8 +9,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from hil.errors import BadInput, RigFault
-from hil.targets.frames import open_source
+from hil.core.errors import BadInput, RigFault
+from hil.rigs.frames import open_source
 from vision import cv_compat
 from vision.sources import CameraControls, ImageFolder, LiveCamera, VideoFile
 

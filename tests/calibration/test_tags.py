@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from hil.config.camera import CameraConfig
-from hil.errors import BadInput
-from hil.types import Pose, PoseMeasurement, wrap_pi
+from hil.core.errors import BadInput
+from hil.core.types import Pose, PoseMeasurement, wrap_pi
 from sim_twin.camera_sim import RenderedCamera
 from vision import cv_compat
-from vision.rigid import fit_pose
+from vision.pose_fit import fit_pose
 from vision.tags import TagLocaliser
 from vision.tracker import Tracker
 

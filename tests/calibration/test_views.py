@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner
 
 from hil.cli.calibrate import command as calibrate
-from hil.errors import BadInput
-from hil.targets.base import Frame
+from hil.core.errors import BadInput
+from hil.core.rig import Frame
 from tests.calibration.render import at_floor, board_image
 from vision.calibration.boards import BoardView, inner_corners, parse_board
 from vision.calibration.files import read_camera

@@ -8,7 +8,7 @@ import pytest
 
 from hil.config.deck import load_deck
 from hil.config.load import builtin_names, load_scenario, merge, unit_of
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 
 MINIMAL = """
 base = "lab"

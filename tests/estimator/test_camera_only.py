@@ -5,8 +5,8 @@ import math
 import pytest
 
 from hil.config.control import EstimatorConfig
-from hil.estimator import make_estimator
-from hil.types import Pose, PoseMeasurement
+from hil.control.estimators import make_estimator
+from hil.core.types import Pose, PoseMeasurement
 from tests.estimator.world import TRUE, Conditions, World
 
 

@@ -5,9 +5,9 @@ import math
 import pytest
 
 from hil.config.control import EstimatorConfig
-from hil.estimator._fused import PoseFilter, wrap_pi
-from hil.estimator.fused import assumptions
-from hil.types import wrap_pi as wrap_pi_of_types
+from hil.control.estimators._fused import PoseFilter, wrap_pi
+from hil.control.estimators.fused import assumptions
+from hil.core.types import wrap_pi as wrap_pi_of_types
 
 CONFIG = EstimatorConfig(
     sigma_scale=0.1, sigma_d0_m=0.01, slip_ratio=0.02, drift_m_s05=0.001, drift_rad_s05=0.002
@@ -106,7 +106,7 @@ def test_the_heading_is_compared_across_the_cut():
     ],
 )
 def test_angles_are_wrapped_as_everywhere_else(angle):
-    """The same bits as hil.types.wrap_pi, right at the cut and one unit in the last place aside."""
+    """The same bits as hil.core.types.wrap_pi, right at the cut and one unit in the last place aside."""
     assert wrap_pi(angle).hex() == wrap_pi_of_types(angle).hex()
 
 

@@ -6,9 +6,9 @@ import time
 import pytest
 
 from hil.config.control import EstimatorConfig
-from hil.errors import BadInput
-from hil.estimator import BelievedGeometry, make_estimator
-from hil.types import Pose, PoseMeasurement, WheelSample
+from hil.control.estimators import BelievedGeometry, make_estimator
+from hil.core.errors import BadInput
+from hil.core.types import Pose, PoseMeasurement, WheelSample
 from tests.estimator.world import LAG_S, TRUE, Conditions, World
 
 USUAL = Conditions()

@@ -7,8 +7,8 @@ import random
 from collections import deque
 from dataclasses import dataclass
 
-from hil.estimator import BelievedGeometry
-from hil.types import Estimator, Pose, PoseMeasurement, WheelSample, wrap_pi
+from hil.control.estimators import BelievedGeometry
+from hil.core.types import Estimator, Pose, PoseMeasurement, WheelSample, wrap_pi
 
 TRUE = BelievedGeometry(0.0482, 0.2166, 0.03, 1920)
 LAG_S = 0.06

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from hil import _firmware
+from hil.board import _firmware
 from hil.wire import dialect, identity
 from hil.wire.framing import FrameReader, FrameWriter
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from hil import _firmware
+from hil.board import _firmware
 from hil.wire import dialect
 from tests.firmware.bench import BoardBench, Motor
 

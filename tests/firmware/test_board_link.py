@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from hil import _firmware
+from hil.board import _firmware
 from hil.wire import dialect, identity
 from hil.wire.framing import FrameWriter
 from tests.firmware.bench import BoardBench, Motor

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from pymavlink.dialects.v20 import common
 
-from hil import _firmware
-from hil.wire import codegen, dialect, identity
+from hil.board import _firmware, codegen
+from hil.wire import dialect, identity
 
 STANDARD = {
     "HEARTBEAT": 0, "SYS_STATUS": 1, "PARAM_REQUEST_READ": 20, "PARAM_REQUEST_LIST": 21,

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hil.wire import codegen, dialect
+from hil.board import codegen
+from hil.wire import dialect
 from hil.wire.framing import FrameWriter
 from tests.firmware.bench import BoardBench
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hil import _firmware
+from hil.board import _firmware
 
 # Thesis section 8.10.3: last << 2 | now, with AB = MSB LSB.
 UP = (0b1101, 0b0100, 0b0010, 0b1011)

@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from hil import _firmware
+from hil.board import _firmware
 from hil.wire import dialect
 from tests.firmware.bench import COUNT_RAD, BoardBench, Motor
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
-from hil import _firmware
+from hil.board import _firmware
 from tests.firmware.bench import COUNT_RAD, TICK_S, rms
 
 Scheme = _firmware.Scheme

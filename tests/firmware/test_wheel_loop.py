@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from hil import _firmware
+from hil.board import _firmware
 from tests.firmware.bench import TICK_S, Motor, rms
 
 ISM, PID = {"LAW": 0.0}, {"LAW": 1.0}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from hil.types import Estimate, OuterLaw, Pose, ReferenceState, Vec2
+from hil.core.types import Estimate, OuterLaw, Pose, ReferenceState, Vec2
 
 D0_M = 0.03
 

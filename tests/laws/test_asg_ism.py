@@ -6,17 +6,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hil import ideal
 from hil.config.control import CircleReference, ControlConfig, OuterLimits
-from hil.ideal import CIRCLE_GAINS, CIRCLE_LIMITS, CIRCLE_START, Disturbances, run_ideal
-from hil.laws import make_outer_law
-from hil.laws.asg_ism import AsgIsm, power
+from hil.control.laws import make_outer_law
+from hil.control.laws.asg_ism import AsgIsm, power
+from hil.study import ideal_circle
+from hil.study.ideal_circle import (
+    CIRCLE_GAINS,
+    CIRCLE_LIMITS,
+    CIRCLE_START,
+    Disturbances,
+    run_ideal,
+)
 from tests.laws.support import D0_M, drive_to, estimate, point
 
 CIRCLE = CircleReference()
 
 
-def circle_run(gains=CIRCLE_GAINS.asg_ism, xi=ideal.NO_DISTURBANCE, start=CIRCLE_START, **k):
+def circle_run(gains=CIRCLE_GAINS.asg_ism, xi=ideal_circle.NO_DISTURBANCE, start=CIRCLE_START, **k):
     law = AsgIsm(gains, CIRCLE_LIMITS, D0_M)
     return law, run_ideal(law, CIRCLE, start, disturbances=xi, **k)
 
@@ -144,7 +150,7 @@ def test_point_is_reached_from_rest_on_either_side_beside_and_behind(outer, star
 @pytest.mark.parametrize("outer", ["asg-ism", "pid"])
 def test_wrong_sign_of_b_does_not_reach_the_point(outer, monkeypatch):
     """Negative control: with the lateral sign of B flipped neither law comes within 20 mm in 20 s."""
-    from hil.laws import chain  # noqa: PLC0415
+    from hil.control.laws import chain  # noqa: PLC0415
 
     right = chain.damped_inverse
     monkeypatch.setattr(
@@ -166,7 +172,7 @@ def arrives_without_spinning(outer):
 @pytest.mark.parametrize("outer", ["asg-ism", "pid"])
 def test_wrong_sign_of_b_is_told_by_error_or_turn_with_the_shipped_gains(outer, monkeypatch):
     """Fast gains can drift onto the point while spinning: the error alone would not tell."""
-    from hil.laws import chain  # noqa: PLC0415
+    from hil.control.laws import chain  # noqa: PLC0415
 
     assert arrives_without_spinning(outer)
     right = chain.damped_inverse

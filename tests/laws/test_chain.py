@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hil.config.control import OuterLimits
-from hil.laws.chain import Chain, damped_inverse, restrict
+from hil.control.laws.chain import Chain, damped_inverse, restrict
 from tests.laws.support import D0_M, estimate
 
 # cos and sin of theta are symbols with their own rates, so that everything is a polynomial.

@@ -5,9 +5,9 @@ import math
 import pytest
 
 from hil.config.control import OuterLimits
-from hil.ideal import CIRCLE_GAINS
-from hil.laws import make_outer_law
-from hil.types import ReferenceState
+from hil.control.laws import make_outer_law
+from hil.core.types import ReferenceState
+from hil.study.ideal_circle import CIRCLE_GAINS
 from tests.laws.support import D0_M, estimate, point
 
 DT = 1.0 / 30.0

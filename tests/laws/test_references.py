@@ -5,8 +5,8 @@ import math
 import pytest
 
 from hil.config.control import CircleReference, PointReference, WaypointReference
-from hil.errors import BadInput
-from hil.references import make_reference
+from hil.control.references import make_reference
+from hil.core.errors import BadInput
 
 CORNERS = WaypointReference(
     points_m=((0.0, 0.0), (0.5, 0.0), (0.5, 0.4), (-0.2, 0.4)),

@@ -4,14 +4,14 @@ import math
 
 import pytest
 
-from hil import ideal
 from hil.config.control import CircleReference, OuterLimits, PidGains
-from hil.errors import BadInput
-from hil.ideal import CIRCLE_GAINS, CIRCLE_LIMITS, CIRCLE_START, run_circle, run_ideal
-from hil.laws import asg_ism, make_outer_law, state_feedback
-from hil.laws.chain import Chain
-from hil.laws.state_feedback import StateFeedback
-from hil.types import ReferenceState
+from hil.control.laws import asg_ism, make_outer_law, state_feedback
+from hil.control.laws.chain import Chain
+from hil.control.laws.state_feedback import StateFeedback
+from hil.core.errors import BadInput
+from hil.core.types import ReferenceState
+from hil.study import ideal_circle
+from hil.study.ideal_circle import CIRCLE_GAINS, CIRCLE_LIMITS, CIRCLE_START, run_circle, run_ideal
 from tests.laws.support import D0_M, drive_to, estimate
 
 
@@ -76,7 +76,11 @@ def test_printed_signs_of_a_and_b_diverge(outer, monkeypatch):
     monkeypatch.setattr(module, "Chain", PrintedChain)
     law = make_outer_law(outer, CIRCLE_GAINS, CIRCLE_LIMITS, D0_M)
     run = run_ideal(
-        law, CircleReference(), CIRCLE_START, disturbances=ideal.NO_DISTURBANCE, give_up_m=1.0
+        law,
+        CircleReference(),
+        CIRCLE_START,
+        disturbances=ideal_circle.NO_DISTURBANCE,
+        give_up_m=1.0,
     )
     assert math.hypot(*run.delta1_m[-1]) > 0.7
     assert run.t_s[-1] < 79.0

@@ -8,14 +8,7 @@ import pytest
 
 from hil.config.control import ControlConfig, Gains
 from hil.config.load import load_scenario
-from hil.held_out import (
-    ALL_SCENARIOS,
-    HELD_OUT_SCENARIOS,
-    held_out_trials,
-    judge,
-    with_verdict,
-)
-from hil.tune import (
+from hil.study.tune import (
     CASES,
     COST_FAILED,
     COST_WEIGHTS,
@@ -30,6 +23,13 @@ from hil.tune import (
     tune,
     with_values,
     write_gain_set,
+)
+from hil.study.tuning_verdict import (
+    ALL_SCENARIOS,
+    HELD_OUT_SCENARIOS,
+    held_out_trials,
+    judge,
+    with_verdict,
 )
 
 BASE = ControlConfig().active_gains

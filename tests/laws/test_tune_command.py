@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from hil.cli.tune import command
 from hil.config.control import Gains
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from tests.laws.test_tune import STILL, distance
 
 
@@ -25,7 +25,7 @@ class Bowl:
 
 @pytest.fixture(autouse=True)
 def bowl(monkeypatch):
-    monkeypatch.setattr("hil.tune.OnTarget", Bowl)
+    monkeypatch.setattr("hil.study.tune.OnTarget", Bowl)
 
 
 def test_gain_set_holds_what_was_found_and_how_it_was_judged(tmp_path):

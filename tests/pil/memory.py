@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
-from hil.firmware import Toolchain, find_toolchain, sketch_folder
+from hil.board.build import Toolchain, find_toolchain, sketch_folder
 
 _RAM = 0x800000
 

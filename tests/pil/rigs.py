@@ -9,8 +9,8 @@ import pytest
 from hil.config.camera import CameraConfig
 from hil.config.events import Fault
 from hil.config.link import LinkConfig
-from hil.targets.base import ByteStream
-from hil.types import Pose
+from hil.core.rig import ByteStream
+from hil.core.types import Pose
 from hil.wire.link import BoardLink, WheelReport
 from sim_twin.pil import Pil, pil_is_missing
 from sim_twin.twin import HOST_START_S, TwinSetup

@@ -5,7 +5,7 @@ import random
 import pytest
 
 from hil.config.link import LinkConfig
-from hil.wire import bringup
+from hil.wire import handshake
 from tests.firmware.test_hostile_bytes import honest_frames
 from tests.pil.rigs import PilDrive, needs_toolchain
 
@@ -126,7 +126,7 @@ def test_hostile_bytes_neither_move_nor_hang_it():
         assert drive.duties == (0.0, 0.0)
     drive.wait(0.2)
     assert drive.link.state_name == "DISARMED"
-    bringup.finish(drive.link, drive.twin, bringup.read_info(drive.link))
+    handshake.finish(drive.link, drive.twin, handshake.read_info(drive.link))
     usage = drive.board.usage()
     assert usage["watchdog_resets"] == 0
     assert drive.board.complaints == []

@@ -2,8 +2,8 @@
 
 import pytest
 
-from hil.firmware import FLASH_LIMIT_BYTES, RAM_LIMIT_BYTES
-from sim_twin.firmware_cost import CLOCK_HZ, TICKS_PER_S, measure
+from hil.board.build import FLASH_LIMIT_BYTES, RAM_LIMIT_BYTES
+from hil.tools.firmware_cost import CLOCK_HZ, TICKS_PER_S, measure
 from tests.pil.rigs import needs_toolchain
 from tests.twin.rigs import robot
 

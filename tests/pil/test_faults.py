@@ -2,10 +2,10 @@
 
 import pytest
 
-from hil import _firmware
+from hil.board import _firmware
 from hil.config.events import Fault
-from hil.errors import RigFault
-from hil.wire import bringup, dialect
+from hil.core.errors import RigFault
+from hil.wire import dialect, handshake
 from tests.pil.memory import constants, symbols
 from tests.pil.rigs import PilDrive, needs_toolchain
 
@@ -45,7 +45,7 @@ def test_reset_in_mid_motion_ends_disarmed_and_is_named():
 def test_reset_at_rest_is_no_restart_while_armed():
     """The mark of having been armed is not left behind by a disarmed board (negative control)."""
     drive = moving(Fault(kind="board_reset", start_s=1.0, end_s=1.05))
-    bringup.finish(drive.link, drive.twin, bringup.disarm(drive.link))
+    handshake.finish(drive.link, drive.twin, handshake.disarm(drive.link))
     drive.wait(2.5)
     assert drive.link.state_name == "DISARMED"
     assert not [text for text in drive.texts if text.startswith("restarted")]
@@ -106,12 +106,12 @@ def test_hung_program_is_reset_by_the_watchdog():
 def test_wrong_hash_does_not_arm(wrong):
     """A host of another dialect or with other parameters is refused by name, and nothing moves."""
     drive = PilDrive()
-    bringup.finish(drive.link, drive.twin, bringup.read_info(drive.link))
+    handshake.finish(drive.link, drive.twin, handshake.read_info(drive.link))
     hashes = [drive.link.info.dialect_hash, drive.link.info.parameter_hash]
     hashes[0 if wrong == "dialect" else 1] ^= 1
-    arming = bringup.arm(drive.link, *hashes)
+    arming = handshake.arm(drive.link, *hashes)
     with pytest.raises(RigFault, match=f"not armed: {wrong} hashes differ"):
-        bringup.finish(drive.link, drive.twin, arming)
+        handshake.finish(drive.link, drive.twin, arming)
     drive.run(1.0, SPEED_RAD_S, SPEED_RAD_S)
     assert_at_rest(drive)
     assert drive.link.state_name == "DISARMED"
@@ -120,10 +120,10 @@ def test_wrong_hash_does_not_arm(wrong):
 def saved(drive, name="PID_KP", value=0.2):
     """Set a parameter and order the board to store them; returns when it has accepted."""
     for step in (
-        bringup.download_parameters(drive.link),
-        bringup.set_parameter(drive.link, name, value),
+        handshake.download_parameters(drive.link),
+        handshake.set_parameter(drive.link, name, value),
     ):
-        bringup.finish(drive.link, drive.twin, step)
+        handshake.finish(drive.link, drive.twin, step)
     drive.link.send_command(dialect.MAV_CMD_PREFLIGHT_STORAGE, 0, 1.0)
 
 
@@ -138,7 +138,7 @@ def test_stored_parameters_survive_power_down():
     saved(first)
     first.wait(image_s() + 0.1)
     second = PilDrive(eeprom=first.board.eeprom(512))
-    bringup.finish(second.link, second.twin, bringup.download_parameters(second.link))
+    handshake.finish(second.link, second.twin, handshake.download_parameters(second.link))
     assert second.link.parameters["PID_KP"] == pytest.approx(0.2)
     assert second.link.parameters["PID_KI"] == first.link.parameters["PID_KI"]
     second.wait(1.0)
@@ -153,7 +153,7 @@ def test_half_written_eeprom_leaves_the_defaults_and_says_so():
     second = PilDrive(eeprom=first.board.eeprom(512))
     second.wait(1.0)
     assert "stored parameters damaged, defaults in force" in second.texts
-    bringup.finish(second.link, second.twin, bringup.download_parameters(second.link))
+    handshake.finish(second.link, second.twin, handshake.download_parameters(second.link))
     defaults = {entry.name: entry.default for entry in _firmware.parameter_table()}
     assert second.link.parameters == pytest.approx(defaults)
     assert_at_rest(second)

@@ -5,11 +5,11 @@ from itertools import pairwise
 
 import pytest
 
-import hil.run
-from hil import _firmware
+import hil.runs.execute
+from hil.board import _firmware
 from hil.config.load import load_scenario
-from hil.run import RunSpec, execute
-from hil.targets import twin_setup
+from hil.rigs.opening import twin_setup
+from hil.runs.execute import RunSpec, execute
 from hil.wire.framing import HOST_SYSTEM, FrameReader
 from sim_twin.pil import Pil
 from tests.pil.memory import board_size_and, symbols
@@ -32,7 +32,7 @@ def recorded(tmp_path_factory):
     base = symbols(rig.build.elf)["g_board"]
     rig.board.watch(base + inputs, base, size)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(hil.run, "open_rig", lambda *_: rig)
+        patch.setattr(hil.runs.execute, "open_rig", lambda *_: rig)
         spec = RunSpec(
             scenario=scenario,
             target="pil",

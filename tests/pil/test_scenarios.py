@@ -3,7 +3,7 @@
 import pytest
 
 from hil.config.load import load_scenario
-from hil.run import RunSpec, execute
+from hil.runs.execute import RunSpec, execute
 from tests.pil.rigs import needs_toolchain
 
 pytestmark = needs_toolchain

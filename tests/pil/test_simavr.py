@@ -4,7 +4,7 @@ import subprocess
 
 import pytest
 
-from hil.firmware import find_toolchain
+from hil.board.build import find_toolchain
 from sim_twin.pil import pil_module
 from sim_twin.pil_profile import FLASH_WORDS
 from tests.pil.rigs import needs_toolchain

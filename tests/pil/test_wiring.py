@@ -2,7 +2,7 @@
 
 import re
 
-from hil.firmware import sketch_folder
+from hil.board.build import sketch_folder
 
 # pins.h name -> row of the page.
 ROWS = {

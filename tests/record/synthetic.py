@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hil.metrics import LinkStats
+from hil.analysis.metrics import LinkStats
 from hil.record.manifest import Manifest
 from hil.record.reader import RunRecord
 from hil.record.recorder import Recorder

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from hil import metrics
-from hil.errors import BadInput
-from hil.metrics import METRICS, LinkStats
+from hil.analysis import metrics
+from hil.analysis.metrics import METRICS, LinkStats
+from hil.core.errors import BadInput
 from hil.record.schema import SAMPLE_NAMES
 
 T_S = np.linspace(0.0, 10.0, 1001)

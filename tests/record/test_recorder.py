@@ -17,7 +17,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from hil.record.layout import FRAMES_JOURNAL, SAMPLES_JOURNAL
 from hil.record.manifest import read_manifest
 from hil.record.reader import read_run

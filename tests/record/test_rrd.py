@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from hil.record import viewer
 from hil.record.rrd import PLOTS, entity_names, write_rrd
 from hil.record.schema import SAMPLE_NAMES

@@ -12,7 +12,7 @@ from hil.record.memory import MemoryRecorder
 from hil.record.reader import read_run
 from hil.record.timeline import Timeline
 from hil.record.tlog import read_tlog
-from hil.run import RunSpec, execute, execute_in_memory
+from hil.runs.execute import RunSpec, execute, execute_in_memory
 from tests.record.synthetic import manifest
 
 

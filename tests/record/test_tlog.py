@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from hil.record.tlog import TlogWriter, install_dialect, read_tlog
 from hil.wire import dialect
 

@@ -11,10 +11,10 @@ from typing import Any
 
 from hil.config.load import load_scenario, merge
 from hil.config.scenario import Scenario
+from hil.core.rig import Frame, Rig, Truth
 from hil.record.reader import RunRecord
-from hil.run import RunSpec, execute
-from hil.targets import open_rig
-from hil.targets.base import Frame, Rig, Truth
+from hil.rigs.opening import open_rig
+from hil.runs.execute import RunSpec, execute
 
 
 def spec(

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from hil.config.load import load_scenario
-from hil.ctrl_c import CtrlC
-from hil.errors import BadInput, RigFault
+from hil.core.errors import BadInput, RigFault
+from hil.core.types import Estimate
 from hil.record.journal import read_parquet, write_parquet
 from hil.record.schema import SAMPLE_COLUMNS
-from hil.replay.exact import COMMANDS, replay
-from hil.run import execute
-from hil.targets import open_rig
-from hil.types import Estimate
+from hil.replays.exact import COMMANDS, replay
+from hil.rigs.opening import open_rig
+from hil.runs.execute import execute
+from hil.runs.interruption import CtrlC
 from tests.replay.records import cut, record, record_on_wall_clock, spec, unclose
 
 GAIN = "control.gains.tuned.asg_ism.k1_s"

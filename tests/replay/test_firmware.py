@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from hil.errors import BadInput
-from hil.replay.elf import elf
-from hil.replay.firmware import PHASES_US, Sent, Tick, core, replay_wheels
+from hil.core.errors import BadInput
+from hil.replays.elf import elf
+from hil.replays.firmware import PHASES_US, Sent, Tick, core, replay_wheels
 from tests.pil.rigs import needs_toolchain
 from tests.replay.records import cut, record
 

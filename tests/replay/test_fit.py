@@ -8,10 +8,10 @@ import pytest
 
 from hil.config.load import build
 from hil.config.scenario import Scenario
-from hil.errors import BadInput
-from hil.replay.exact import read_source
-from hil.replay.fit import Fit, Rehearsal, fit_twin
-from hil.replay.what_if import what_if
+from hil.core.errors import BadInput
+from hil.replays.exact import read_source
+from hil.replays.fit import Fit, Rehearsal, fit_twin
+from hil.replays.what_if import what_if
 from tests.replay.records import record
 
 # Gains of its own: what a fit can tell shall not change with each tuning.
@@ -60,7 +60,7 @@ def test_fit_holds_on_parts_it_has_not_seen(fit: Fit) -> None:
 
 def test_answer_carries_its_checks(made: Path, fit: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
     """The recorded law on the fitted twin does about what it did in the record."""
-    monkeypatch.setattr("hil.replay.what_if.SEEDS", 3)
+    monkeypatch.setattr("hil.replays.what_if.SEEDS", 3)
     answer = what_if(made, "asg-ism", fit=fit)
     ise = answer.answers["ise_m2_s"]
     assert ise.baseline_mean == pytest.approx(answer.in_record["ise_m2_s"], rel=0.1)

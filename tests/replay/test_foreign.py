@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import common
 
-from hil.errors import BadInput
-from hil.foreign import import_log
+from hil.core.errors import BadInput
+from hil.record.log_import import import_log
 from hil.record.reader import read_run
 from hil.record.tlog import read_tlog
 from hil.report.compare import compare_runs

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hil.report.compare import compare_runs
-from hil.report.tiers import tier_gap
+from hil.report.target_gap import tier_gap
 from tests.record.synthetic import make_run
 
 

@@ -12,13 +12,13 @@ from pathlib import Path
 import pytest
 
 from hil.config.deck import Deck
-from hil.errors import BadInput
-from hil.experiment import Conditions, claim, deck_specs, study
+from hil.core.errors import BadInput
 from hil.record.reader import RunRecord
 from hil.report.csv_table import write_csv
 from hil.report.html import render
 from hil.report.repeats import repeats_of
-from hil.run import execute, execute_in_memory
+from hil.runs.execute import execute, execute_in_memory
+from hil.study.experiment import Conditions, claim, deck_specs, study
 
 DECK = Deck(scenarios=("scenario-1",), laws=("pid", "asg-ism"))
 

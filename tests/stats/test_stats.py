@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hil.stats import adjusted, bca_interval, paired, t_interval
+from hil.analysis.stats import adjusted, bca_interval, paired, t_interval
 
 
 def test_interval_and_effect_are_those_of_a_hand_calculation() -> None:

@@ -10,8 +10,8 @@ from random import Random
 import pytest
 
 from hil.config.load import builtin_names
-from hil.errors import BadInput
-from hil.sweep.campaign import Campaign, Distribution, Range, load_campaign
+from hil.core.errors import BadInput
+from hil.study.campaign.plan import Campaign, Distribution, Range, load_campaign
 
 
 def campaign(folder: Path, text: str) -> Campaign:

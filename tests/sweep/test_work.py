@@ -10,15 +10,15 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from hil.errors import BadInput, RigFault
-from hil.metrics import METRICS
-from hil.run import RunSpec, execute
-from hil.sweep.answers import documents, outcomes_of, sentences
-from hil.sweep.campaign import Campaign, load_campaign
-from hil.sweep.crew import in_processes, on_dask
-from hil.sweep.maps import write_page
-from hil.sweep.results import ResultStore
-from hil.sweep.work import Worker, run_campaign
+from hil.analysis.metrics import METRICS
+from hil.core.errors import BadInput, RigFault
+from hil.runs.execute import RunSpec, execute
+from hil.study.campaign.findings import documents, outcomes_of, sentences
+from hil.study.campaign.maps import write_page
+from hil.study.campaign.plan import Campaign, load_campaign
+from hil.study.campaign.results import ResultStore
+from hil.study.campaign.work import Worker, run_campaign
+from hil.study.campaign.workers import in_processes, on_dask
 from tests.sweep.deadly import DiesOnce, always_dies
 
 TEXT = """

@@ -9,7 +9,7 @@ from typing import Any
 from hil.config.load import load_scenario, merge
 from hil.config.scenario import Scenario
 from hil.record.reader import RunRecord
-from hil.run import RunSpec, execute
+from hil.runs.execute import RunSpec, execute
 
 
 def scenario_with(

@@ -11,8 +11,8 @@ from hil.config.camera import CameraConfig
 from hil.config.events import Disturbance, Fault
 from hil.config.link import LinkConfig
 from hil.config.robot import RobotConfig
-from hil.types import Pose
-from hil.wire import bringup
+from hil.core.types import Pose
+from hil.wire import handshake
 from hil.wire.link import BoardLink, WheelReport
 from sim_twin import _native
 from sim_twin.setup import plant_params
@@ -102,10 +102,10 @@ class Drive:
 
     def arm(self) -> None:
         """Bring the board up and arm it."""
-        bringup.finish(self.link, self.twin, bringup.read_info(self.link))
+        handshake.finish(self.link, self.twin, handshake.read_info(self.link))
         info = self.link.info
-        arming = bringup.arm(self.link, info.dialect_hash, info.parameter_hash)
-        bringup.finish(self.link, self.twin, arming)
+        arming = handshake.arm(self.link, info.dialect_hash, info.parameter_hash)
+        handshake.finish(self.link, self.twin, arming)
 
     def run(
         self, seconds: float, left_rad_s: float, right_rad_s: float, *, speak: bool = True

@@ -9,7 +9,7 @@ from random import Random
 import pytest
 
 from hil.config.camera import CameraConfig
-from sim_twin.shutter import CLOCK_PPM, Shutter
+from sim_twin.camera_timing import CLOCK_PPM, Shutter
 
 
 def frames(count, stalls=(), seed=1, **fields):

@@ -10,8 +10,8 @@ import pytest
 from hil.config.camera import CameraConfig, MarkConfig, MarksConfig
 from hil.config.events import Disturbance, Fault
 from hil.config.link import LinkConfig
-from hil.errors import RigFault
-from hil.types import Pose, wrap_pi
+from hil.core.errors import RigFault
+from hil.core.types import Pose, wrap_pi
 from hil.wire import dialect
 from sim_twin.twin import HOST_START_S, Twin, TwinSetup
 from tests.twin.rigs import Drive, armed, first, robot

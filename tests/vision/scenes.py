@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from hil.config.camera import CameraConfig
-from hil.types import Pose, wrap_pi
+from hil.core.types import Pose, wrap_pi
 from sim_twin.camera_sim import RenderedCamera
 from vision.marks import MarkLocaliser
 

@@ -5,7 +5,7 @@ from random import Random
 
 import numpy as np
 
-from hil.types import Pose
+from hil.core.types import Pose
 from sim_twin.drawn_poses import DrawnPoses, load_localiser_error
 from tests.vision.scenes import DEFAULT, errors, localiser, moving, near, random_poses, rms
 

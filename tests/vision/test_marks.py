@@ -6,9 +6,9 @@ from random import Random
 import numpy as np
 import pytest
 
-from hil import bench_vision
 from hil.config.camera import BarConfig, ClutterConfig, MarksConfig, SceneConfig
-from hil.types import Pose
+from hil.core.types import Pose
+from hil.tools import bench_vision
 from tests.vision.scenes import (
     DEFAULT,
     at_rest,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hil.config.camera import BarConfig, CameraConfig, ClutterConfig, MarksConfig, SceneConfig
-from hil.types import Pose
+from hil.core.types import Pose
 from sim_twin.camera_sim import RenderedCamera
 from vision.marks import MarkLocaliser
 

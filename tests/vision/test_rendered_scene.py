@@ -19,7 +19,7 @@ from hil.config.camera import (
     ShadowEdgeConfig,
     TagConfig,
 )
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from sim_twin import _native
 from sim_twin.camera_sim import RenderedCamera, _view
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from hil import wheel_bench, wheel_tune
 from hil.cli.bench import command
 from hil.config.events import Fault
-from hil.errors import BadInput, RigFault
-from hil.wheel_bench import BELIEVED, CASES, DEFAULT, LAWS, Case, Trace, figures, run
+from hil.core.errors import BadInput, RigFault
+from hil.study import wheel_bench, wheel_tune
+from hil.study.wheel_bench import BELIEVED, CASES, DEFAULT, LAWS, Case, Trace, figures, run
 
 TICK_S = 0.004
 HELD_OUT = wheel_bench.held_out(1)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from hil import _firmware
-from hil.targets.base import Frame, Truth
+from hil.board import _firmware
+from hil.core.rig import Frame, Truth
 
 Spoil = Callable[[bytes], bytes]
 TICK_S = _firmware.TICK_US * 1e-6

@@ -7,9 +7,9 @@ from statistics import mean
 
 import pytest
 
-from hil import _firmware
-from hil.errors import RigFault
-from hil.wire import bringup, dialect, identity
+from hil.board import _firmware
+from hil.core.errors import RigFault
+from hil.wire import dialect, handshake, identity
 from hil.wire.framing import BOARD_SYSTEM, HOST_SYSTEM
 from hil.wire.link import BoardLink
 from tests.wire.board_rig import TICK_S, BoardRig
@@ -19,13 +19,13 @@ DEFAULTS = {entry.name: entry.default for entry in _firmware.parameter_table()}
 
 def connected(rig: BoardRig, parameters=None) -> BoardLink:
     link = BoardLink(rig.stream)
-    bringup.finish(link, rig, bringup.connect(link, parameters or {}))
+    handshake.finish(link, rig, handshake.connect(link, parameters or {}))
     return link
 
 
 def armed(rig: BoardRig) -> BoardLink:
     link = connected(rig, DEFAULTS)
-    bringup.finish(link, rig, bringup.arm(link, *identity.board_hashes(link.parameters)))
+    handshake.finish(link, rig, handshake.arm(link, *identity.board_hashes(link.parameters)))
     return link
 
 
@@ -106,7 +106,7 @@ def test_disarming_stops_the_wheels():
     link = armed(rig)
     drive(link, rig, 0.5)
     assert rig.pwm != (0, 0)
-    bringup.finish(link, rig, bringup.disarm(link))
+    handshake.finish(link, rig, handshake.disarm(link))
     drive(link, rig, 0.1)
     assert rig.pwm == (0, 0)
     assert link.state_name == "DISARMED"
@@ -120,7 +120,7 @@ def test_arming_with_a_wrong_hash_is_refused(which):
     hashes = list(identity.board_hashes(link.parameters))
     hashes[which == "parameter"] ^= 1
     with pytest.raises(RigFault, match=f"refuses to arm .* not armed: {which} hashes differ"):
-        bringup.finish(link, rig, bringup.arm(link, *hashes))
+        handshake.finish(link, rig, handshake.arm(link, *hashes))
     drive(link, rig, 0.3)
     assert rig.pwm == (0, 0)
     assert not link.armed
@@ -151,7 +151,7 @@ def test_a_board_that_falls_silent_ends_the_request():
         link.poll(rig.now_s())
     rig.up = lambda _: b""
     with pytest.raises(RigFault, match="no answer to the request for its identity within 5 s"):
-        bringup.finish(link, rig, bringup.connect(link, {}))
+        handshake.finish(link, rig, handshake.connect(link, {}))
 
 
 def test_silence_stops_the_wheels_within_250_ms():
@@ -178,7 +178,7 @@ def test_only_a_new_arming_leaves_safe():
     link.stop_now(rig.now_s())
     drive(link, rig, 1.0)
     assert (link.state_name, rig.pwm) == ("SAFE (STOP_COMMAND)", (0, 0))
-    bringup.finish(link, rig, bringup.arm(link, *identity.board_hashes(link.parameters)))
+    handshake.finish(link, rig, handshake.arm(link, *identity.board_hashes(link.parameters)))
     drive(link, rig, 0.5)
     assert link.armed
     assert rig.pwm != (0, 0)
@@ -226,7 +226,7 @@ def test_a_bad_line_is_survived():
     rig = BoardRig()
     rig.up = rig.down = spoil
     link = connected(rig, DEFAULTS | {"PID_KP": 0.2, "PID_KI": 1.1})
-    bringup.finish(link, rig, bringup.arm(link, *identity.board_hashes(link.parameters)))
+    handshake.finish(link, rig, handshake.arm(link, *identity.board_hashes(link.parameters)))
     reports = drive(link, rig, 5.0)
     assert link.armed
     assert 0.03 < link.loss_ratio < 0.3
@@ -273,7 +273,7 @@ def test_every_frame_of_both_ways_reaches_the_tap():
     tapped = []
     rig = BoardRig()
     link = BoardLink(rig.stream, lambda t_s, frame: tapped.append((WAYS[frame[5]], t_s, frame)))
-    bringup.finish(link, rig, bringup.connect(link, DEFAULTS))
+    handshake.finish(link, rig, handshake.connect(link, DEFAULTS))
     drive(link, rig, 0.5)
     decoder = dialect.MAVLink(None)
     names = {"rx": set(), "tx": set()}

@@ -6,10 +6,10 @@ import pytest
 from click.testing import CliRunner
 from pymavlink import mavutil
 
-from hil.bridge import UdpBridge, ned_from_world, parse_address
 from hil.cli.run import command
-from hil.errors import BadInput
-from hil.types import Estimate, Pose
+from hil.core.errors import BadInput
+from hil.core.types import Estimate, Pose
+from hil.tools.bridge import UdpBridge, ned_from_world, parse_address
 
 
 def estimate(theta_rad: float, theta_dot_rad_s: float = 0.0, d0_m: float = 0.03) -> Estimate:

@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from hil.clocks import BoardClock, CameraClock
+from hil.core.clocks import BoardClock, CameraClock
 
 WRAP_US = 2**32
 

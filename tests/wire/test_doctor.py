@@ -6,8 +6,8 @@ from types import SimpleNamespace
 from click.testing import CliRunner
 from serial.tools import list_ports
 
-from hil import doctor
 from hil.cli.doctor import command
+from hil.tools import doctor
 
 
 def by_name(findings):
@@ -21,7 +21,7 @@ def test_json_is_one_document_and_the_status_is_0():
     findings = {f["name"]: f for f in json.loads(result.stdout)["findings"]}
     assert findings["pymavlink"]["state"] == "ok"
     assert findings["pymavlink"]["detail"][0].isdigit()
-    assert findings["hil._firmware"]["state"] == "ok"
+    assert findings["hil.board._firmware"]["state"] == "ok"
 
 
 def test_the_table_names_every_group():

@@ -9,14 +9,14 @@ import cv2
 import numpy as np
 import pytest
 
-from hil import _firmware
-from hil.errors import BadInput, RigFault
-from hil.serve import TwinServer
-from hil.targets.base import Frame
-from hil.targets.frames import CaptureSource, SocketSource, encode_frame, open_source
-from hil.targets.serial import SerialRig, SerialStream, parse_target
-from hil.types import Pose, PoseMeasurement
-from hil.wire import bringup, identity
+from hil.board import _firmware
+from hil.core.errors import BadInput, RigFault
+from hil.core.rig import Frame
+from hil.core.types import Pose, PoseMeasurement
+from hil.rigs.frames import CaptureSource, SocketSource, encode_frame, open_source
+from hil.rigs.serial import SerialRig, SerialStream, parse_target
+from hil.tools.serve_twin import TwinServer
+from hil.wire import handshake, identity
 from hil.wire.link import BoardLink
 from tests.wire.board_rig import BoardRig
 
@@ -78,8 +78,8 @@ def test_a_board_on_a_pseudo_terminal_is_met_like_a_real_one(tmp_path):
     with served(tmp_path, board) as server:
         rig = SerialRig(str(tmp_path / "board"), 57_600, open_source(f"twin:{tmp_path / 'camera'}"))
         link = BoardLink(rig.stream)
-        bringup.finish(link, rig, bringup.connect(link, DEFAULTS))
-        bringup.finish(link, rig, bringup.arm(link, *identity.board_hashes(link.parameters)))
+        handshake.finish(link, rig, handshake.connect(link, DEFAULTS))
+        handshake.finish(link, rig, handshake.arm(link, *identity.board_hashes(link.parameters)))
         trips, frames, due_s = [], [], rig.now_s()
         end_s = due_s + 1.0
         while rig.now_s() < end_s:
@@ -93,7 +93,7 @@ def test_a_board_on_a_pseudo_terminal_is_met_like_a_real_one(tmp_path):
                 frames.append(frame)
         assert link.armed
         assert board.pwm[0] > 40
-        bringup.finish(link, rig, bringup.disarm(link))
+        handshake.finish(link, rig, handshake.disarm(link))
         rig.close()
         rig.close()
     assert len(board.begun_s) == 1

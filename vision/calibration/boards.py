@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from vision import cv_compat
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from vision.calibration.tables import read_table
 from vision.cv_compat import read_image
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hil.types import Pose
+from hil.core.types import Pose
 from vision.calibration.floor import FloorCalibration
 from vision.calibration.intrinsics import (
     GRID_COLUMNS,

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from hil.config.camera import CameraConfig
 from hil.config.load import build
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from vision.calibration.colours import ColourCalibration
 from vision.calibration.floor import FloorCalibration
 from vision.calibration.intrinsics import LensCalibration

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from vision import cv_compat
 from vision.calibration.points import PointPairs
 from vision.camera import CameraModel, distort

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from vision import cv_compat
 from vision.calibration.boards import BoardView
 from vision.camera import CameraModel

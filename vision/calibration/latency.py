@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from vision import cv_compat
 from vision.calibration.boards import Board, BoardView, Chessboard
 from vision.calibration.tables import read_numbers

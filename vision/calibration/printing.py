@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import escape
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from vision.calibration.boards import Board, Rect
 from vision.cv_compat import write_atomic
 

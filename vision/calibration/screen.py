@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 from vision.calibration.latency import switching_times
 from vision.sources import LiveCamera
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from hil.errors import BadInput
+from hil.core.errors import BadInput
 
 MM = 1e-3
 

@@ -1,0 +1,1 @@
+"""The firmware: its compiled core, builds, uploads, generated code."""

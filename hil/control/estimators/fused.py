@@ -1,0 +1,68 @@
+"""The default estimator as the session sees it; the filter itself is C++ (hil/control/estimators/native)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from hil.control.estimators import _fused
+from hil.core.types import Estimate, Pose, PoseMeasurement, WheelSample
+
+if TYPE_CHECKING:
+    from hil.config.control import EstimatorConfig
+    from hil.control.estimators.geometry import BelievedGeometry
+
+
+def assumptions(config: EstimatorConfig) -> _fused.Assumptions:
+    """Return what the estimator assumes, as the native parts take it."""
+    native = _fused.Assumptions()
+    for name in _fused.ASSUMPTIONS:
+        setattr(native, name, getattr(config, name))
+    return native
+
+
+class Fused(_fused.Fused):
+    """Camera poses and wheel counts fused at the exposure time, predicted to the actuation time.
+
+    World frame, SI. How it works: hil/control/estimators/native/fused.hpp.
+    """
+
+    def __init__(self, config: EstimatorConfig, geometry: BelievedGeometry) -> None:
+        believed = _fused.Geometry(
+            geometry.wheel_radius_m, geometry.track_width_m, geometry.d0_m, geometry.rad_per_count
+        )
+        super().__init__(assumptions(config), believed)
+        self._wheels = geometry.wheels
+
+    def on_command(self, t_effect_s: float, eta1_m_s: float, theta_dot_rad_s: float) -> None:
+        """Take the body speeds commanded to be in effect from `t_effect_s` on."""
+        left, right = self._wheels(eta1_m_s, theta_dot_rad_s)
+        self.take_command(t_effect_s, left, right)
+
+    def on_wheels(self, sample: WheelSample) -> None:
+        """Take one wheel report (in time order; a stale one is dropped)."""
+        self.take_wheels(sample.t_host_s, sample.counts_left, sample.counts_right)
+
+    def on_pose(self, t_exposure_s: float, measurement: PoseMeasurement) -> None:
+        """Take the pose seen at `t_exposure_s` in the past; older than the last one is dropped."""
+        pose = measurement.pose
+        if pose is not None:
+            self.take_pose(
+                t_exposure_s,
+                pose.x_m,
+                pose.y_m,
+                pose.theta_rad,
+                measurement.sigma_xy_m,
+                measurement.sigma_theta_rad,
+            )
+
+    def estimate_at(self, t_host_s: float) -> Estimate | None:
+        """Return the state at `t_host_s`, past the last exposure; None before the first pose.
+
+        Speeds are predicted; for a time already passed they are those of the latest report.
+        """
+        state = self.state_at(t_host_s)
+        if state is None:
+            return None
+        x_m, y_m, theta_rad, eta1_m_s, theta_dot_rad_s, z1_m, z2_m_s = state
+        pose = Pose(x_m, y_m, theta_rad)
+        return Estimate(t_host_s, pose, eta1_m_s, theta_dot_rad_s, z1_m, z2_m_s)

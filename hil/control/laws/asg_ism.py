@@ -1,0 +1,120 @@
+"""Backstepping with the averaged sub-gradient integral sliding mode, (8.2)-(8.22) as corrected.
+
+World frame, SI. Powers and signs are componentwise, delta_i = z_i - z_i* throughout. The symbols
+are the thesis's own; equation numbers stand beside them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from hil.control.laws.chain import Chain, ChainState, restrict
+from hil.control.laws.trace import make_trace
+from hil.core.types import OuterCommand
+
+if TYPE_CHECKING:
+    from hil.config.control import AsgIsmGains, OuterLimits
+    from hil.core.types import Estimate, ReferenceState, Vec2
+
+# Below this error the exponents p and p - 1 are continued as at it: |d|^(p-2) has no bound at 0.
+_SMALL = 1e-3
+
+
+def power(d: float, d_dot: float, d_ddot: float, k: float, p: float) -> tuple[float, float, float]:
+    """Return k |d|^p sgn(d) and its first two time derivatives."""
+    if p == 1.0:
+        return k * d, k * d_dot, k * d_ddot
+    size = max(abs(d), _SMALL)
+    slope = k * p * size ** (p - 1.0)
+    bend = slope * (p - 1.0) / size * math.copysign(1.0, d) if abs(d) > _SMALL else 0.0
+    value = k * abs(d) ** p
+    return math.copysign(value, d), slope * d_dot, bend * d_dot * d_dot + slope * d_ddot
+
+
+def sign(x: float) -> float:
+    """Return the sub-gradient of |x| used here: -1, 0 or 1."""
+    return 1.0 if x > 0.0 else -1.0 if x < 0.0 else 0.0
+
+
+class AsgIsm:
+    """The proposed outer law; one instance runs one robot."""
+
+    def __init__(self, gains: AsgIsmGains, limits: OuterLimits, d0_m: float) -> None:
+        self._gains = gains
+        self._limits = limits
+        self._d0 = d0_m
+        self._chain = Chain(limits)
+        self._t = 0.0
+        self._gamma = (0.0, 0.0)
+        self._delta4 = (0.0, 0.0)
+        self._sum_dh = (0.0, 0.0)
+
+    def reset(self, reference: ReferenceState, estimate: Estimate) -> None:
+        """Start anew: integrals to zero, gamma = -mu0 delta3(0) so that s(0) = 0."""
+        z1, z1_ref = estimate.z1_m, reference.z1_m
+        self._chain.reset(estimate, (z1_ref[0] - z1[0], z1_ref[1] - z1[1]))
+        self._t = 0.0
+        self._delta4 = self._sum_dh = (0.0, 0.0)
+        delta3, _ = self._backstep(reference, estimate, self._chain.state(estimate))
+        self._gamma = (-self._gains.mu0_s * delta3[0], -self._gains.mu0_s * delta3[1])
+
+    @property
+    def delta4_m_s(self) -> Vec2:
+        """Return the integral of delta3 (8.13), the argument of the cost H."""
+        return self._delta4
+
+    @property
+    def gamma_m_s(self) -> Vec2:
+        """Return gamma of (8.17)."""
+        return self._gamma
+
+    def _backstep(
+        self, reference: ReferenceState, estimate: Estimate, state: ChainState
+    ) -> tuple[Vec2, Vec2]:
+        """Return delta3 and d z3*/dt through the stages (8.6), (8.11) with restrictions."""
+        gains, limits = self._gains, self._limits
+        (x, y), (x_ref, y_ref) = estimate.z1_m, reference.z1_m
+        (vx, vy), (vx_ref, vy_ref) = state.z2, reference.z1_dot_m_s
+        (ax, ay), (ax_ref, ay_ref) = state.z3, reference.z1_ddot_m_s2
+        px, px_dot, px_ddot = power(x - x_ref, vx - vx_ref, ax - ax_ref, gains.k1_s, gains.p)
+        py, py_dot, py_ddot = power(y - y_ref, vy - vy_ref, ay - ay_ref, gains.k1_s, gains.p)
+        g, g_dot, g_ddot = restrict(
+            (px, py), (px_dot, py_dot), (px_ddot, py_ddot), limits.approach_speed_m_s
+        )
+        # z2* = z1*_dot - g, so delta2 = z2 - z1*_dot + g (8.9) and z3* = z2*_dot - r (8.11)
+        qx, qx_dot, _ = power(vx - vx_ref + g[0], ax - ax_ref + g_dot[0], 0.0, gains.k2_s, gains.p)
+        qy, qy_dot, _ = power(vy - vy_ref + g[1], ay - ay_ref + g_dot[1], 0.0, gains.k2_s, gains.p)
+        r, r_dot, _ = restrict((qx, qy), (qx_dot, qy_dot), (0.0, 0.0), limits.approach_accel_m_s2)
+        jx_ref, jy_ref = reference.z1_dddot_m_s3
+        delta3 = (ax - ax_ref + g_dot[0] + r[0], ay - ay_ref + g_dot[1] + r[1])
+        return delta3, (jx_ref - g_ddot[0] - r_dot[0], jy_ref - g_ddot[1] - r_dot[1])
+
+    def step(self, reference: ReferenceState, estimate: Estimate, dt_s: float) -> OuterCommand:
+        """Return the command for the next `dt_s`."""
+        gains = self._gains
+        state = self._chain.state(estimate)
+        (d3x, d3y), (jx, jy) = self._backstep(reference, estimate, state)
+        d4x, d4y = self._delta4
+        sum_x, sum_y = self._sum_dh
+        mu = 1.0 / (self._t + gains.mu0_s)
+        psi_x, psi_y = mu * sum_x, mu * sum_y  # (8.17)
+        ax, ay = mu * (d4x + self._gamma[0]), mu * (d4y + self._gamma[1])
+        sx, sy = d3x + ax + psi_x, d3y + ay + psi_y
+        dh_x, dh_y = gains.sigma_m_s2 * sign(d4x), gains.sigma_m_s2 * sign(d4y)
+        kappa_x = mu * (d3x - ax + dh_x - psi_x)  # (8.20) corrected
+        kappa_y = mu * (d3y - ay + dh_y - psi_y)
+        eps = max(gains.eps0_m_s2 * mu ** (1.0 + gains.beta), gains.eps_min_m_s2)
+        norm = math.hypot(sx, sy)
+        pull = gains.alpha_m_s3 / (norm + eps)
+        out = self._chain.command(
+            (jx - kappa_x - pull * sx, jy - kappa_y - pull * sy), state, dt_s
+        )  # (8.22) corrected: static, v = B^-1 [...]
+        self._t += dt_s
+        if not out.saturated:
+            self._delta4 = (d4x + d3x * dt_s, d4y + d3y * dt_s)  # (8.13)
+            self._sum_dh = (sum_x + dh_x * dt_s, sum_y + dh_y * dt_s)
+        trace = make_trace(
+            state, out, self._d0, s=(sx, sy), psi=(psi_x, psi_y), eps=eps, in_layer=norm <= eps
+        )
+        return OuterCommand(out.eta1, out.w, trace)

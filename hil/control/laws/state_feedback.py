@@ -1,0 +1,64 @@
+"""The benchmark: state feedback in PID form on the same linearised chain (control.md section 2).
+
+    jerk = z1*_dddot - K_i int delta1 - K_p delta1 - K_d1 delta1_dot - K_d2 delta1_ddot
+
+Written as nested stages so that the restrictions on approach speed and acceleration act on it
+exactly as on the backstepping law; with the restrictions off it is the line above.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from hil.control.laws.chain import Chain, authority, restrict
+from hil.control.laws.trace import make_trace
+from hil.core.types import OuterCommand
+
+if TYPE_CHECKING:
+    from hil.config.control import OuterLimits, PidGains
+    from hil.core.types import Estimate, ReferenceState
+
+_ZERO = (0.0, 0.0)
+
+
+class StateFeedback:
+    """The PID law; one instance runs one robot."""
+
+    def __init__(self, gains: PidGains, limits: OuterLimits, d0_m: float) -> None:
+        self._gains = gains
+        self._limits = limits
+        self._d0 = d0_m
+        self._chain = Chain(limits)
+        self._integral = _ZERO
+
+    def reset(self, reference: ReferenceState, estimate: Estimate) -> None:
+        """Start anew: integral to zero, zeta to its start."""
+        z1, z1_ref = estimate.z1_m, reference.z1_m
+        self._chain.reset(estimate, (z1_ref[0] - z1[0], z1_ref[1] - z1[1]))
+        self._integral = _ZERO
+
+    def step(self, reference: ReferenceState, estimate: Estimate, dt_s: float) -> OuterCommand:
+        """Return the command for the next `dt_s`."""
+        gains, limits = self._gains, self._limits
+        state = self._chain.state(estimate)
+        (x, y), (x_ref, y_ref) = estimate.z1_m, reference.z1_m
+        (vx, vy), (vx_ref, vy_ref) = state.z2, reference.z1_dot_m_s
+        (ax, ay), (ax_ref, ay_ref) = state.z3, reference.z1_ddot_m_s2
+        d1x, d1y = x - x_ref, y - y_ref
+        ix, iy = self._integral
+        kd1, kd2 = gains.kd1_s2, gains.kd2_s
+        position = (
+            (gains.kp_s3 * d1x + gains.ki_s4 * ix) / kd1,
+            (gains.kp_s3 * d1y + gains.ki_s4 * iy) / kd1,
+        )
+        g, _, _ = restrict(position, _ZERO, _ZERO, limits.approach_speed_m_s)
+        ratio = kd1 / kd2
+        velocity = (ratio * (vx - vx_ref + g[0]), ratio * (vy - vy_ref + g[1]))
+        r, _, _ = restrict(velocity, _ZERO, _ZERO, limits.approach_accel_m_s2)
+        jx_ref, jy_ref = reference.z1_dddot_m_s3
+        jerk = (jx_ref - kd2 * (ax - ax_ref + r[0]), jy_ref - kd2 * (ay - ay_ref + r[1]))
+        out = self._chain.command(jerk, state, dt_s)
+        if not out.saturated:
+            grow = dt_s * authority(position, limits.approach_speed_m_s)
+            self._integral = (ix + d1x * grow, iy + d1y * grow)
+        return OuterCommand(out.eta1, out.w, make_trace(state, out, self._d0))

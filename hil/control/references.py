@@ -1,0 +1,169 @@
+"""References for the flat output z1*, with three analytic derivatives (world axes, SI)."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from hil.config.control import CircleReference, PointReference, ReferenceConfig, WaypointReference
+from hil.core.errors import BadInput
+from hil.core.types import ReferenceState
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+_ZERO = (0.0, 0.0)
+
+
+class Reference(Protocol):
+    """A desired motion of the flat output."""
+
+    def at(self, t_s: float) -> ReferenceState:
+        """Return the desired state `t_s` after the start of the run (negative: as at 0)."""
+
+
+class Point:
+    """A fixed point."""
+
+    def __init__(self, config: PointReference) -> None:
+        self._state = ReferenceState((config.x_m, config.y_m), _ZERO, _ZERO, _ZERO)
+
+    def at(self, t_s: float) -> ReferenceState:  # noqa: ARG002 - a point does not move
+        """Return the point at rest."""
+        return self._state
+
+
+class Circle:
+    """The circle (8.23), clockwise from (0, radius) about the centre.
+
+    X* = R sin(wt), Y* = R cos(wt), theta* = atan2(Y*, X*) - pi/2, which unwrapped is -wt; then
+    z1* = [X* + d0 cos theta*, Y* + d0 sin theta*].
+    """
+
+    def __init__(self, config: CircleReference) -> None:
+        self._config = config
+
+    def at(self, t_s: float) -> ReferenceState:
+        """Return the desired state; each derivative is the one before turned and scaled by w."""
+        config = self._config
+        w = config.rate_rad_s
+        angle = w * max(t_s, 0.0)
+        s, c = math.sin(angle), math.cos(angle)
+        x = config.radius_m * s + config.d0_m * c
+        y = config.radius_m * c - config.d0_m * s
+        w2 = w * w
+        return ReferenceState(
+            (config.center_x_m + x, config.center_y_m + y),
+            (w * y, -w * x),
+            (-w2 * x, -w2 * y),
+            (-w2 * w * y, w2 * w * x),
+        )
+
+
+class Waypoints:
+    """A quintic spline through the waypoints, run from rest to rest.
+
+    The path p(u) is four times differentiable in the chord length u; the time law u(t) is the
+    septic smooth step, whose speed, acceleration and jerk vanish at both ends. The duration is the
+    shortest that keeps speed and turn rate within their bounds.
+    """
+
+    def __init__(self, config: WaypointReference) -> None:
+        points = np.asarray(config.points_m, dtype=float)
+        chords = np.hypot(*np.diff(points, axis=0).T)
+        if float(chords.min()) < 1e-3:
+            raise BadInput(
+                f"reference.points_m: neighbouring waypoints {float(chords.min()):.4f} m apart, "
+                "at least 0.001 m is needed; drop the repeated point"
+            )
+        knots = np.concatenate(([0.0], np.cumsum(chords)))
+        spline = _quintic(knots, points)
+        self._length = float(knots[-1])
+        self._pieces = _pieces(spline, knots)
+        self._knots = [float(k) for k in knots]
+        self.duration_s = self._shortest_duration(spline, config)
+
+    def _shortest_duration(self, spline: BSpline, config: WaypointReference) -> float:
+        """Return the duration at which the tighter of the two bounds is met."""
+        tau = np.linspace(0.0, 1.0, 2001)[1:-1]
+        u = self._length * tau**4 * (35 - 84 * tau + 70 * tau**2 - 20 * tau**3)
+        rate = self._length * 140 * tau**3 * (1 - tau) ** 3
+        d1, d2 = spline(u, 1), spline(u, 2)
+        speed = np.hypot(d1[:, 0], d1[:, 1])
+        turn = np.abs(d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]) / np.maximum(speed, 1e-9) ** 2
+        return float(
+            max(
+                (speed * rate).max() / config.speed_max_m_s,
+                (turn * rate).max() / config.turn_rate_max_rad_s,
+            )
+        )
+
+    def at(self, t_s: float) -> ReferenceState:
+        """Return the desired state; before the start and after the end it is at rest."""
+        duration = self.duration_s
+        tau = min(max(t_s / duration, 0.0), 1.0)
+        rest = 1.0 - tau
+        length = self._length
+        u = length * tau**4 * (35 - 84 * tau + 70 * tau**2 - 20 * tau**3)
+        u1 = length / duration * 140 * tau**3 * rest**3
+        u2 = length / duration**2 * 420 * tau**2 * rest**2 * (1 - 2 * tau)
+        u3 = length / duration**3 * 840 * tau * rest * (1 - 5 * tau + 5 * tau**2)
+        piece = self._pieces[_interval(self._knots, u)]
+        x = _chain_rule(piece[1], u - piece[0], u1, u2, u3)
+        y = _chain_rule(piece[2], u - piece[0], u1, u2, u3)
+        return ReferenceState((x[0], y[0]), (x[1], y[1]), (x[2], y[2]), (x[3], y[3]))
+
+
+_Poly = tuple[float, ...]
+_Piece = tuple[float, _Poly, _Poly]
+
+
+def _quintic(knots: np.ndarray, points: np.ndarray) -> BSpline:
+    """Return the interpolating quintic spline with free ends (third and fourth derivative zero)."""
+    from scipy.interpolate import make_interp_spline  # noqa: PLC0415 - slow import, rarely needed
+
+    free = ([(3, np.zeros(2)), (4, np.zeros(2))], [(3, np.zeros(2)), (4, np.zeros(2))])
+    return make_interp_spline(knots, points, k=5, bc_type=free)
+
+
+def _pieces(spline: BSpline, knots: np.ndarray) -> list[_Piece]:
+    """Return, per interval between waypoints, its start and the Taylor polynomials of x and y."""
+    taylor = [
+        np.stack([spline(u, k) / math.factorial(k) for k in range(6)])
+        for u in (knots[:-1] + knots[1:]) / 2
+    ]
+    return [
+        (float((a + b) / 2), tuple(map(float, c[:, 0])), tuple(map(float, c[:, 1])))
+        for (a, b), c in zip(pairwise(knots), taylor, strict=True)
+    ]
+
+
+def _interval(knots: list[float], u: float) -> int:
+    """Return the index of the interval that holds u."""
+    for index in range(len(knots) - 2):
+        if u < knots[index + 1]:
+            return index
+    return len(knots) - 2
+
+
+def _chain_rule(
+    c: _Poly, h: float, u1: float, u2: float, u3: float
+) -> tuple[float, float, float, float]:
+    """Return p(u(t)) and its first three time derivatives, p quintic in h = u - centre."""
+    p0 = c[0] + h * (c[1] + h * (c[2] + h * (c[3] + h * (c[4] + h * c[5]))))
+    p1 = c[1] + h * (2 * c[2] + h * (3 * c[3] + h * (4 * c[4] + h * 5 * c[5])))
+    p2 = 2 * c[2] + h * (6 * c[3] + h * (12 * c[4] + h * 20 * c[5]))
+    p3 = 6 * c[3] + h * (24 * c[4] + h * 60 * c[5])
+    return p0, p1 * u1, p2 * u1 * u1 + p1 * u2, p3 * u1**3 + 3 * p2 * u1 * u2 + p1 * u3
+
+
+def make_reference(config: ReferenceConfig) -> Reference:
+    """Return the reference a scenario asks for."""
+    if isinstance(config, PointReference):
+        return Point(config)
+    if isinstance(config, CircleReference):
+        return Circle(config)
+    return Waypoints(config)

@@ -1,0 +1,72 @@
+"""The boundary below which targets differ: a byte stream to the board, camera frames, a clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from hil.core.types import Pose, PoseMeasurement, Vec2
+
+
+class ByteStream(Protocol):
+    """Bytes to and from the board, as a serial port gives them; never blocks."""
+
+    def read(self) -> bytes:
+        """Return every byte that has arrived by now, b"" if none."""
+
+    def write(self, data: bytes) -> None:
+        """Send the bytes; raises RigFault when the port is gone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One camera frame as it reached the host.
+
+    `t_cam_s` is the middle of the exposure on the camera's own clock. `image` is (H, W, 3) uint8
+    BGR; it is None when the source gives poses itself (`--camera pose`), and `pose` is set then.
+    """
+
+    index: int
+    t_cam_s: float
+    image: NDArray[np.uint8] | None
+    pose: PoseMeasurement | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """What the robot really did: known on simulated robots only, and used for the record only."""
+
+    pose: Pose
+    eta1_m_s: float
+    theta_dot_rad_s: float
+    z1_m: Vec2  # the flat output (2.35) with the robot's true d0
+
+
+class Rig(Protocol):
+    """A robot with its board and camera, real or simulated; times are host times in s."""
+
+    @property
+    def stream(self) -> ByteStream:
+        """The bytes to and from the board."""
+
+    def now_s(self) -> float:
+        """Return the host clock (monotonic)."""
+
+    def wait(self, until_s: float) -> None:
+        """Return at `until_s`, or earlier as soon as bytes or a frame have arrived."""
+
+    def poll_frame(self) -> Frame | None:
+        """Return the oldest frame not yet taken that has arrived by now."""
+
+    def begin(self, t_start_s: float) -> None:
+        """Take note that the controlled part begins: timed disturbances and faults count from it."""
+
+    def truth(self) -> Truth | None:
+        """Return the true state now, or None where nobody knows it."""
+
+    def close(self) -> None:
+        """Release port and camera; safe to call twice."""

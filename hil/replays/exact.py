@@ -1,0 +1,272 @@
+"""Replays of a run record through the host's own session: exact, and as a shadow.
+
+Exact: nothing is changed, and every channel must come out as recorded, bit for bit.
+Shadow: another law, other gains or other assumptions see each recorded state and say what they
+would command there. The recorded command stays in force, so the robot's path does not follow from
+the shadow: it is open loop, and no figure of merit of the other law.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from hil.config.load import build, with_overrides
+from hil.config.scenario import Scenario
+from hil.core.errors import BadInput, RigFault
+from hil.core.types import Estimate, OuterCommand, OuterLaw, ReferenceState
+from hil.record import layout
+from hil.record.manifest import Manifest, read_manifest
+from hil.record.memory import MemoryRecorder
+from hil.record.reader import altered_files, read_table
+from hil.record.schema import FRAME_NAMES, SAMPLE_NAMES
+from hil.record.tape import Tape, read_tape
+from hil.record.tlog import LoggedFrame, read_tlog
+from hil.replays.divergence import Channel, compare_columns, compare_link
+from hil.rigs.opening import true_robot
+from hil.rigs.replay import (
+    ReplayRig,
+    recorded_frames,
+    recorded_images,
+    recorded_truths,
+)
+from hil.runs.execute import RunSpec, board_parameters, make_parts
+from hil.runs.session import Ending, Session
+from hil.wire.identity import board_hashes
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from hil.record.journal import Columns
+
+Kind = Literal["exact", "shadow"]
+COMMANDS = ("eta1_cmd_m_s", "theta_dot_cmd_rad_s", "omega_cmd_left_rad_s", "omega_cmd_right_rad_s")
+# Taken over from the record to complete the rows, not computed again.
+_GIVEN = tuple(name for name in SAMPLE_NAMES if name.startswith("true_"))
+_FRAME_CHECKS = tuple(name for name in FRAME_NAMES if name not in {"t_cam_s", "index"})
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """What a replay needs of a record, as far as it is intact; `problems` says what is not."""
+
+    path: Path
+    manifest: Manifest
+    tape: Tape
+    samples: Columns
+    frames: Columns
+    link: tuple[LoggedFrame, ...]
+    problems: tuple[str, ...]
+
+    @property
+    def has_video(self) -> bool:
+        """Say whether every frame was kept, so that the localiser can be replayed too."""
+        return (self.path / layout.CAMERA).is_file()
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayReport:
+    """What came out. `seen_by` names what the localiser's part was done with.
+
+    `samples` are the replayed rows; of a shadow, with the commands it would have given.
+    """
+
+    path: Path
+    kind: Kind
+    law: str
+    changes: tuple[str, ...]
+    seen_by: str
+    ticks_recorded: int
+    ticks_replayed: int
+    ending: Ending
+    cut_off: bool
+    channels: tuple[Channel, ...]
+    problems: tuple[str, ...]
+    samples: Columns
+
+    @property
+    def identical(self) -> bool:
+        """Say whether every channel agrees to the last bit and every recorded tick was reached."""
+        reached = self.cut_off or self.ticks_replayed == self.ticks_recorded
+        return reached and all(channel.same for channel in self.channels)
+
+    @property
+    def first(self) -> Channel | None:
+        """Return the channel that differs first in time, a command before what follows from it."""
+        different = [channel for channel in self.channels if not channel.same]
+        rank = {name: place for place, name in enumerate(COMMANDS)}
+        return min(different, key=lambda c: (c.first_s, rank.get(c.name, len(rank))), default=None)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the report as one JSON document."""
+        first = self.first
+        return {
+            "record": str(self.path),
+            "kind": self.kind,
+            "law": self.law,
+            "changes": list(self.changes),
+            "identical": self.identical,
+            "seen_by": self.seen_by,
+            "ticks_recorded": self.ticks_recorded,
+            "ticks_replayed": self.ticks_replayed,
+            "ending": {"outcome": self.ending.outcome, "detail": self.ending.detail},
+            "record_cut_off": self.cut_off,
+            "first_divergence": first.to_json() if first else None,
+            "channels": [channel.to_json() for channel in self.channels],
+            "problems": list(self.problems),
+        }
+
+
+def read_source(path: Path) -> Source:
+    """Return what is intact of a record; raises BadInput when nothing can be replayed."""
+    manifest = read_manifest(path)
+    if not (path / layout.TAPE).is_file():
+        raise BadInput(f"{path}: has no {layout.TAPE}: recorded without one, nothing to replay")
+    problems = altered_files(path, manifest)
+    if manifest.outcome == "running":
+        problems.append("cut off in mid-run: the record was never closed")
+    tape = read_tape(path / layout.TAPE)
+    if not tape.entries:
+        raise BadInput(f"{path}: {layout.TAPE} is empty: nothing to replay (an imported log?)")
+    if tape.problem:
+        problems.append(tape.problem)
+    tables = []
+    for finished, journal in (
+        (layout.SAMPLES, layout.SAMPLES_JOURNAL),
+        (layout.FRAMES, layout.FRAMES_JOURNAL),
+    ):
+        try:
+            tables.append(read_table(path, finished, journal, required=True))
+        except BadInput as error:
+            problems.append(str(error))
+            tables.append({})
+    samples, frames = tables
+    link = tuple(read_tlog(path / layout.LINK)) if (path / layout.LINK).is_file() else ()
+    return Source(path, manifest, tape, samples, frames, link, tuple(problems))
+
+
+def open_replay(source: Source, recorded: Scenario) -> ReplayRig:
+    """Return the rig that a record makes; `recorded` is its scenario."""
+    video = source.path / layout.CAMERA
+    images: Iterator[Any] = recorded_images(video) if source.has_video else iter(())
+    return ReplayRig(
+        source.tape,
+        recorded_frames(source.frames, images),
+        recorded_truths(source.samples, true_robot(recorded).d0_m),
+    )
+
+
+def replay(
+    path: Path,
+    outer: str | None = None,
+    overrides: Sequence[str] = (),
+    progress: Callable[[float], None] | None = None,
+) -> ReplayReport:
+    """Replay a record; with another law or changed values, as a shadow of it.
+
+    Raises BadInput when the folder is no record, has nothing to replay, or a change makes no sense.
+    """
+    source = read_source(path)
+    recorded = build(Scenario, source.manifest.scenario, str(path / layout.MANIFEST))
+    scenario = _changed(recorded, overrides)
+    law = outer or source.manifest.outer
+    kind: Kind = "shadow" if overrides or law != source.manifest.outer else "exact"
+    spec = RunSpec(
+        scenario, source.manifest.target, source.manifest.camera, law, source.manifest.inner,
+        source.manifest.seed, path,
+    )  # fmt: skip
+    recorder = MemoryRecorder(source.manifest, keep_link=True)
+    rig = open_replay(source, recorded)
+    parts = make_parts(spec, rig, recorder)
+    shadow = Shadow(parts.law, source.samples) if kind == "shadow" else None
+    parts = replace(parts, law=shadow or parts.law)
+    # The board's parameters are in the record whatever is changed here.
+    parameters = board_parameters(recorded, source.manifest.inner)
+    try:
+        ending = Session(scenario, parts, parameters, board_hashes, progress).run()
+    except RigFault as fault:  # the record ended after the session's own handling of faults
+        ending = Ending("fault", str(fault))
+    record = recorder.close(ending.outcome, ending.detail)
+    samples = record.samples
+    if shadow is not None:
+        samples = samples | shadow.columns(parts.geometry.wheels, samples["t_s"].size)
+    stamps = [
+        LoggedFrame(source.manifest.start_unix_us + round(t_s * 1e6), frame)
+        for t_s, frame in recorder.link_frames
+    ]
+    return ReplayReport(
+        path=path,
+        kind=kind,
+        law=law,
+        changes=tuple(overrides),
+        seen_by=f"frames of {layout.CAMERA}" if source.has_video else "recorded poses",
+        ticks_recorded=source.samples["t_s"].size if source.samples else 0,
+        ticks_replayed=samples["t_s"].size,
+        ending=ending,
+        cut_off=source.manifest.outcome == "running" or rig.ended,
+        channels=tuple(_channels(source, samples, record.frames, stamps)),
+        problems=source.problems,
+        samples=samples,
+    )
+
+
+def _changed(recorded: Scenario, overrides: Sequence[str]) -> Scenario:
+    """Return the scenario of a shadow; what the record alone decides cannot be changed."""
+    changed = with_overrides(recorded, overrides)
+    for key in ("duration_s", "start", "mismatch", "disturbances", "faults"):
+        if getattr(changed, key) != getattr(recorded, key):
+            raise BadInput(f"--set {key}: happened in the record and cannot be changed in a replay")
+    if changed.control.rate_hz != recorded.control.rate_hz:
+        raise BadInput("--set control.rate_hz: a replay has the ticks of the record")
+    return changed
+
+
+def _channels(
+    source: Source, samples: Columns, frames: Columns, link: Sequence[LoggedFrame]
+) -> list[Channel]:
+    """Compare all that was computed again with what the record has of it."""
+    found: list[Channel] = []
+    if source.samples:
+        names = [name for name in SAMPLE_NAMES if name not in _GIVEN]
+        found += compare_columns(source.samples, samples, names, source.samples["t_s"])
+    if source.frames:
+        dated = source.frames["t_arrival_s"]
+        found += [
+            replace(channel, name=f"frame {channel.name}")
+            for channel in compare_columns(source.frames, frames, _FRAME_CHECKS, dated)
+        ]
+    return found + compare_link(source.link, link, source.manifest.start_unix_us)
+
+
+class Shadow:
+    """Steps a law on each recorded state, keeps what it would command, and gives what was."""
+
+    def __init__(self, law: OuterLaw, samples: Columns) -> None:
+        self._law = law
+        given = [samples[name].tolist() for name in COMMANDS[:2]] if samples else [[], []]
+        self._recorded: Iterator[tuple[float, float]] = zip(*given, strict=True)
+        self._commands: list[OuterCommand] = []
+
+    def reset(self, reference: ReferenceState, estimate: Estimate) -> None:
+        """Start anew from this estimate."""
+        self._law.reset(reference, estimate)
+
+    def step(self, reference: ReferenceState, estimate: Estimate, dt_s: float) -> OuterCommand:
+        """Return the recorded command, with the trace of the shadow."""
+        wanted = self._law.step(reference, estimate, dt_s)
+        self._commands.append(wanted)
+        eta1, theta_dot = next(self._recorded, (wanted.eta1_m_s, wanted.theta_dot_rad_s))
+        return OuterCommand(eta1, theta_dot, wanted.trace)
+
+    def columns(self, wheels: Callable[[float, float], tuple[float, float]], rows: int) -> Columns:
+        """Return the command columns as the shadow would have had them."""
+        import numpy as np  # noqa: PLC0415 - the loop itself needs none
+
+        table = [
+            (c.eta1_m_s, c.theta_dot_rad_s, *wheels(c.eta1_m_s, c.theta_dot_rad_s))
+            for c in self._commands[:rows]
+        ]
+        values = np.array(table, dtype=np.float64).reshape(len(table), len(COMMANDS))
+        return {name: values[:, i].copy() for i, name in enumerate(COMMANDS)}

@@ -1,0 +1,35 @@
+"""What `hil replay --out` leaves: the report, and the replayed rows beside their record's name.
+
+It is not a run record: the rows of a shadow hold commands that no robot followed.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hil.core.errors import BadInput
+from hil.record.journal import write_parquet
+from hil.record.manifest import replace_file
+from hil.record.schema import SAMPLE_COLUMNS
+
+if TYPE_CHECKING:
+    from hil.replays.exact import ReplayReport
+
+
+def claim_folder(folder: Path) -> None:
+    """Make the folder, or take an empty one; raises BadInput for anything else."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise BadInput(f"--out {folder}: the folder is not empty; name a new one")
+    except OSError as error:
+        raise BadInput(f"--out {folder}: cannot be made: {error.strerror}") from None
+
+
+def write_output(folder: Path, report: ReplayReport, document: dict[str, Any]) -> None:
+    """Write `document` as replay.json, and replayed.parquet (columns as in samples.parquet)."""
+    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+    write_parquet(folder / "replayed.parquet", report.samples, SAMPLE_COLUMNS)
+    replace_file(folder / "replay.json", text.encode() + b"\n")

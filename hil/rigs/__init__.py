@@ -1,0 +1,1 @@
+"""Rigs: the twin, its board under simavr, a real robot on a port, a record."""

@@ -1,0 +1,1 @@
+"""One run: its specification, its parts, the session, its record."""

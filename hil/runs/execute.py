@@ -1,0 +1,198 @@
+"""From a scenario to a finished run record: builds the parts, runs the session, closes the record."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import cv2
+
+from hil.analysis.metrics import LinkStats
+from hil.control.estimators import BelievedGeometry, make_estimator
+from hil.control.laws import make_outer_law
+from hil.control.references import make_reference
+from hil.core.clocks import CameraClock
+from hil.record.manifest import Manifest, collect_versions, git_revision
+from hil.record.memory import MemoryRecorder
+from hil.record.recorder import Recorder
+from hil.record.tape import TapedRig
+from hil.record.timeline import Timeline
+from hil.rigs.opening import SIMULATED, open_rig
+from hil.runs.interruption import CtrlC
+from hil.runs.session import Parts, Progress, Publish, Session
+from hil.wire.identity import board_hashes
+from hil.wire.link import BoardLink
+from vision.marks import MarkLocaliser
+
+if TYPE_CHECKING:
+    from hil.config.scenario import Scenario
+    from hil.core.rig import Rig
+    from hil.record.memory import RunSink
+    from hil.record.reader import RunRecord
+
+# Value of the board's parameter LAW for each wheel law.
+INNER_LAWS = {"asg-ism": 0.0, "pid": 1.0}
+
+
+@dataclass(frozen=True, slots=True)
+class RunSpec:
+    """Everything that decides a run; two runs of equal specs on a simulated target are equal."""
+
+    scenario: Scenario
+    target: str
+    camera: str
+    outer: str
+    inner: str
+    seed: int
+    out: Path
+    record_camera: bool = False
+    rerun: bool = True
+    command: str = ""
+
+
+def exit_status(record: RunRecord) -> int:
+    """Return the exit status of a run: 0 held, 1 a requirement failed, 3 rig fault, 130 Ctrl-C."""
+    outcome = record.manifest.outcome
+    if outcome != "complete":
+        return 130 if outcome == "interrupted" else 3
+    return 0 if all(verdict.holds for verdict in record.verdicts()) else 1
+
+
+def camera_for(scenario: Scenario, target: str, asked: str | None) -> str:
+    """Return the camera asked for, or the target's default one."""
+    if target.startswith("replay:"):
+        return "as recorded"
+    return asked or (scenario.camera_source if target in SIMULATED else "0")
+
+
+def new_folder(stem: str) -> Path:
+    """Return a folder in runs/ that does not exist yet, named after `stem` and the time."""
+    stamp = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
+    folder = Path("runs") / f"{stem}-{stamp}"
+    number = 2
+    while folder.exists():
+        folder = folder.with_name(f"{stem}-{stamp}-{number}")
+        number += 1
+    return folder
+
+
+def execute(
+    spec: RunSpec,
+    progress: Progress | None = None,
+    rig: Rig | None = None,
+    publish: Publish | None = None,
+) -> RunRecord:
+    """Run the spec and return its closed record; raises BadInput before anything is written.
+
+    `rig` is another one than the spec's target names; it is closed here. `publish` is given the
+    estimate of every tick.
+    """
+    cv2.setNumThreads(1)  # search windows are small: handing them to threads costs more
+    parameters = board_parameters(spec.scenario, spec.inner)
+    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
+    try:
+        recorder = Recorder(
+            spec.out,
+            make_manifest(spec),
+            record_camera=spec.record_camera,
+            frame_rate_hz=spec.scenario.camera.rate_hz,
+            rerun=spec.rerun,
+        )
+        ctrl_c = CtrlC()
+        parts = make_parts(spec, TapedRig(rig, recorder.tape, ctrl_c.obey), recorder)
+        session = Session(spec.scenario, parts, parameters, board_hashes, progress, publish)
+        with ctrl_c:
+            ending = session.run()
+        record = recorder.close(ending.outcome, ending.detail, link_stats(parts.link))
+        ctrl_c.obey()  # pressed after the last wait: this run is whole, whatever follows is not begun
+        return record
+    finally:
+        rig.close()
+
+
+def execute_in_memory(spec: RunSpec, rig: Rig | None = None) -> RunRecord:
+    """Run the spec and return what a record would hold, without writing one (spec.out is unused).
+
+    `rig` is another one than the spec's target names; it is closed here.
+    """
+    parameters = board_parameters(spec.scenario, spec.inner)
+    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
+    try:
+        recorder = MemoryRecorder(make_manifest(spec))
+        parts = make_parts(spec, rig, recorder)
+        ending = Session(spec.scenario, parts, parameters, board_hashes).run()
+        return recorder.close(ending.outcome, ending.detail, link_stats(parts.link))
+    finally:
+        rig.close()
+
+
+def board_parameters(scenario: Scenario, inner: str) -> dict[str, float]:
+    """Return every board parameter as this run needs it."""
+    return scenario.board | {
+        "ENC_COUNTS": float(scenario.robot.encoder_counts_per_turn),
+        "LAW": INNER_LAWS[inner],
+    }
+
+
+def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink) -> Parts:
+    """Return the parts of a session over `rig`."""
+    scenario, control = spec.scenario, spec.scenario.control
+    robot = scenario.robot
+    geometry = BelievedGeometry(
+        robot.wheel_radius_m, robot.track_m, robot.d0_m, robot.encoder_counts_per_turn
+    )
+    timeline = Timeline(recorder, _unix_us)
+    return Parts(
+        rig=rig,
+        link=BoardLink(rig.stream, timeline.link_frame),
+        camera_clock=CameraClock(scenario.camera.latency_s),
+        localiser=MarkLocaliser(scenario.camera.model(), scenario.camera.marks),
+        estimator=make_estimator(control.estimator, control.fusion, geometry),
+        law=make_outer_law(spec.outer, control.active_gains, control.limits, robot.d0_m),
+        reference=make_reference(scenario.reference),
+        geometry=geometry,
+        recorder=recorder,
+        timeline=timeline,
+    )
+
+
+def make_manifest(spec: RunSpec) -> Manifest:
+    """Return the manifest a record opens with."""
+    gains = spec.scenario.control.active_gains.model_dump(mode="json")
+    now_us = _unix_us()
+    return Manifest(
+        command=spec.command,
+        scenario=spec.scenario.model_dump(mode="json"),
+        seed=spec.seed,
+        target=spec.target,
+        camera=spec.camera,
+        outer=spec.outer,
+        inner=spec.inner,
+        gains={
+            "outer": gains[spec.outer.replace("-", "_")],
+            "set": spec.scenario.control.gain_set,
+            "board": board_parameters(spec.scenario, spec.inner),
+        },
+        versions=collect_versions(),
+        git_revision=git_revision(),
+        start_time_utc=datetime.fromtimestamp(now_us * 1e-6, UTC).isoformat(timespec="seconds"),
+        start_unix_us=now_us,
+    )
+
+
+def _unix_us() -> int:
+    return time.time_ns() // 1000
+
+
+def link_stats(link: BoardLink) -> LinkStats:
+    """Return the counters of the host's end of the link."""
+    counters = link.counters
+    return LinkStats(
+        frames_sent=link.frames_sent,
+        frames_received=counters.frames,
+        frames_lost=counters.lost,
+        bytes_rejected=counters.skipped_bytes,
+    )

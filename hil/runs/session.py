@@ -1,0 +1,363 @@
+"""One run of one scenario over one rig: connect, find the robot, arm, control, stop.
+
+The loop sees a byte stream, camera frames and a clock (`hil.core.rig.Rig`) and never asks what
+is behind them. Host time is the rig's; `t_s` counts from the first tick of the controlled part.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from hil.core.errors import RigFault
+from hil.record.tick_rows import sample_row
+from hil.wire import handshake
+
+if TYPE_CHECKING:
+    from hil.config.scenario import Scenario
+    from hil.control.estimators.geometry import BelievedGeometry
+    from hil.control.references import Reference
+    from hil.core.clocks import CameraClock
+    from hil.core.rig import Frame, Rig
+    from hil.core.types import Estimate, Estimator, OuterCommand, OuterLaw, PoseMeasurement
+    from hil.record.memory import RunSink
+    from hil.record.timeline import Timeline
+    from hil.wire.link import BoardLink, WheelReport
+    from vision.tracker import Localiser
+
+# Poses and time exchanges wanted before the start; both ties are then good to a few ms.
+_POSES_WANTED = 15
+_EXCHANGES_WANTED = 8
+_FIND_TIMEOUT_S = 5.0
+_ARM_TIMEOUT_S = 1.0
+_STOP_TIMEOUT_S = 2.0
+# A tick that begins later than this share of its period is a missed deadline.
+_LATE_RATIO = 0.5
+# Share by which the measured delay to the board follows a new round trip.
+_UPLINK_GAIN = 0.05
+
+Progress = Callable[[float], None]
+# Takes host time, state of the robot, and whether it is armed, once a tick.
+Publish = Callable[[float, "Estimate", bool], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What a session is made of."""
+
+    rig: Rig
+    link: BoardLink
+    camera_clock: CameraClock
+    localiser: Localiser
+    estimator: Estimator
+    law: OuterLaw
+    reference: Reference
+    geometry: BelievedGeometry
+    recorder: RunSink
+    timeline: Timeline
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How the controlled part ended; `detail` names the cause of a fault."""
+
+    outcome: Literal["complete", "fault", "interrupted"]
+    detail: str = ""
+
+
+class Session:
+    """Runs the scenario once; `run` may be called once."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        parts: Parts,
+        parameters: dict[str, float],
+        hashes: Callable[[dict[str, float]], tuple[int, int]],
+        progress: Progress | None = None,
+        publish: Publish | None = None,
+    ) -> None:
+        self._scenario = scenario
+        self._parts = parts
+        self._parameters = parameters
+        self._hashes = hashes
+        self._progress = progress
+        self._publish = publish
+        self._t0_s = 0.0
+        self._dialect_hash = self._parameter_hash = 0
+        self._may_move = False
+        self._texts_noted = 0
+        self._report: WheelReport | None = None
+        self._measurement: PoseMeasurement | None = None
+        self._pose_time_s = self._pose_time_recorded_s = -math.inf
+        self._camera_latency_s = math.nan
+        self._poses = 0
+        self._uplink_s = scenario.link.latency_s
+
+    def run(self) -> Ending:
+        """Run all phases; the robot is stopped whatever happens."""
+        ending = Ending("fault", "ended without a cause")
+        try:
+            self._connect()
+            self._find_robot()
+            self._arm()
+            self._control()
+            ending = Ending("complete")
+        except RigFault as fault:
+            ending = Ending("fault", str(fault))
+        except KeyboardInterrupt:
+            ending = Ending("interrupted", "Ctrl-C")
+        finally:
+            self._stop()
+        self._note(ending.outcome, ending.detail)
+        self._parts.timeline.start(self._parts.rig.now_s())
+        return ending
+
+    # -- phases --------------------------------------------------------------------------------
+
+    def _connect(self) -> None:
+        link = self._parts.link
+        link.begin(handshake.connect(link, self._parameters))
+        self._pump_while(lambda: link.busy, math.inf)
+        self._dialect_hash, self._parameter_hash = self._hashes(link.parameters)
+        self._parts.recorder.identify(
+            f"{link.info.dialect_hash:08x}",
+            f"{link.info.parameter_hash:08x}",
+            link.info.build_id,
+        )
+        self._note("connected", f"{len(link.parameters)} parameters")
+
+    def _find_robot(self) -> None:
+        """Wait at rest until the robot was seen and both clocks are tied."""
+        link = self._parts.link
+        ready = self._pump_while(
+            lambda: self._poses < _POSES_WANTED or link.clock.exchanges < _EXCHANGES_WANTED,
+            self._parts.rig.now_s() + _FIND_TIMEOUT_S,
+        )
+        if ready:
+            self._note("found", f"clock tie {link.clock.sigma_s * 1e3:.2f} ms (1 sigma)")
+            return
+        if self._poses < _POSES_WANTED:
+            why = self._measurement.reason if self._measurement else "no frame came"
+            raise RigFault(
+                f"camera: robot seen {self._poses} times in {_FIND_TIMEOUT_S:.0f} s, "
+                f"{_POSES_WANTED} are needed ({why}); check light, marks and camera pose"
+            )
+        raise RigFault(
+            f"board: {link.clock.exchanges} time exchanges in {_FIND_TIMEOUT_S:.0f} s, "
+            f"{_EXCHANGES_WANTED} are needed; check range and baud rate"
+        )
+
+    def _arm(self) -> None:
+        link = self._parts.link
+        self._may_move = True  # from here on the robot is stopped, whatever the board last said
+        now_s = self._parts.rig.now_s()
+        link.begin(handshake.arm(link, self._dialect_hash, self._parameter_hash))
+        self._pump_until(now_s)  # the command goes out
+        # Set-points go right behind it: the board stops by itself after 250 ms of silence, and
+        # its answer may take longer.
+        self._pump_while(lambda: link.busy, math.inf, feed=True)
+        if not self._pump_while(
+            lambda: not link.armed, self._parts.rig.now_s() + _ARM_TIMEOUT_S, feed=True
+        ):
+            raise RigFault(f"board: acknowledged arming and stayed {link.state_name}")
+        self._note("armed", link.state_name)
+
+    def _control(self) -> None:
+        scenario, rig, law = self._scenario, self._parts.rig, self._parts.law
+        period_s = 1.0 / scenario.control.rate_hz
+        ticks = round(scenario.duration_s * scenario.control.rate_hz) + 1
+        self._t0_s = rig.now_s()
+        self._parts.timeline.start(self._t0_s)
+        rig.begin(self._t0_s)
+        for tick in range(ticks):
+            due_s = self._t0_s + tick * period_s
+            self._pump_until(due_s)
+            now_s = rig.now_s()
+            self._check_safety(now_s)
+            estimate = self._estimate(now_s + self._uplink_s)
+            reference = self._parts.reference.at(estimate.t_host_s - self._t0_s)
+            if tick == 0:
+                law.reset(reference, estimate)
+            command = law.step(reference, estimate, period_s)
+            wheels = self._command_wheels(now_s, command)
+            self._record(now_s, command, wheels, now_s - due_s > _LATE_RATIO * period_s)
+            if self._publish is not None:
+                self._publish(now_s, estimate, self._parts.link.armed)
+            if self._progress is not None:
+                self._progress(now_s - self._t0_s)
+
+    def _stop(self) -> None:
+        """Stop the wheels: politely while the board answers, by repeated stop commands if not."""
+        rig, link = self._parts.rig, self._parts.link
+        if not self._may_move:
+            return
+        try:
+            self._send_wheels(0.0, 0.0)
+            link.begin(handshake.disarm(link))
+            if self._pump_while(lambda: link.busy or link.armed, rig.now_s() + _STOP_TIMEOUT_S):
+                self._note("stopped", link.state_name)
+                return
+            reason = "no answer to the stop; the board's own time-out ends its motion"
+        except (RigFault, KeyboardInterrupt) as error:
+            reason = str(error) or "Ctrl-C"
+        link.stop_now(rig.now_s())
+        self._note("stop", f"emergency stop sent: {reason}")
+
+    # -- events --------------------------------------------------------------------------------
+
+    def _pump_until(self, until_s: float) -> None:
+        """Take bytes and frames as they arrive until `until_s`; wait at least once, if for no time.
+
+        Ctrl-C is obeyed in waits (`hil.runs.interruption`): a host that is always late must come to one too.
+        """
+        rig = self._parts.rig
+        waited = False
+        while True:
+            now_s = rig.now_s()
+            self._take_all(now_s)
+            if now_s >= until_s:
+                break
+            rig.wait(until_s)
+            waited = True
+        if not waited:
+            rig.wait(now_s)
+
+    def _pump_while(
+        self, waiting: Callable[[], bool], until_s: float, *, feed: bool = False
+    ) -> bool:
+        """Pump while `waiting()`; return whether it ended before `until_s`.
+
+        With `feed`, zero set-points are sent at the outer rate meanwhile.
+        """
+        rig = self._parts.rig
+        period_s = 1.0 / self._scenario.control.rate_hz
+        while waiting():
+            now_s = rig.now_s()
+            if now_s >= until_s:
+                return False
+            if feed:
+                self._send_wheels(0.0, 0.0)
+            self._pump_until(min(until_s, now_s + period_s))
+        return True
+
+    def _take_all(self, now_s: float) -> None:
+        parts = self._parts
+        for report in parts.link.poll(now_s):
+            self._report = report
+            parts.estimator.on_wheels(report.sample)
+            if report.round_trip_s == report.round_trip_s:
+                self._uplink_s += _UPLINK_GAIN * (0.5 * report.round_trip_s - self._uplink_s)
+        while (frame := parts.rig.poll_frame()) is not None:
+            self._take_frame(frame, now_s)
+        if parts.link.texts_heard != self._texts_noted:
+            self._note_texts()
+
+    def _note_texts(self) -> None:
+        link = self._parts.link
+        new = link.texts_heard - self._texts_noted
+        self._texts_noted = link.texts_heard
+        for text in list(link.texts)[-new:]:
+            self._note("board", text.text)
+
+    def _take_frame(self, frame: Frame, now_s: float) -> None:
+        """Localise one frame and hand the pose to the estimator at its exposure time."""
+        parts = self._parts
+        parts.camera_clock.arrival(frame.t_cam_s, now_s)
+        exposure_s = parts.camera_clock.to_host_s(frame.t_cam_s)
+        measurement = frame.pose
+        if measurement is None:
+            assert frame.image is not None
+            before = parts.estimator.estimate_at(exposure_s)
+            measurement = parts.localiser.locate(
+                frame.image,
+                before.pose if before is not None else None,
+                self._scenario.camera.search_radius_m,
+            )
+        self._measurement = measurement
+        self._camera_latency_s = now_s - exposure_s
+        if measurement.pose is not None:
+            self._poses += 1
+            self._pose_time_s = exposure_s
+            parts.estimator.on_pose(exposure_s, measurement)
+        parts.timeline.camera_frame(frame, now_s, exposure_s, measurement)
+
+    def _check_safety(self, now_s: float) -> None:
+        """Raise RigFault when the host itself must stop the robot."""
+        safety, link = self._scenario.safety, self._parts.link
+        if not link.armed:
+            raise RigFault(f"board: left ARMED by itself: {link.state_name}")
+        silent_s = now_s - (self._report.t_arrival_s if self._report else -math.inf)
+        if silent_s > safety.link_lost_s:
+            raise RigFault(
+                f"link: no wheel report for {silent_s:.2f} s (limit {safety.link_lost_s:g} s)"
+            )
+        unseen_s = now_s - self._pose_time_s
+        if unseen_s > safety.pose_lost_s:
+            reason = self._measurement.reason if self._measurement else ""
+            raise RigFault(
+                f"camera: robot not seen for {unseen_s:.2f} s (limit {safety.pose_lost_s:g} s)"
+                f"{': ' + reason if reason else ''}"
+            )
+
+    def _estimate(self, t_effect_s: float) -> Estimate:
+        """Return the state at the actuation time, inside the fence; else RigFault."""
+        estimate = self._parts.estimator.estimate_at(t_effect_s)
+        if estimate is None:
+            raise RigFault("camera: no pose to estimate from")
+        fence, pose = self._scenario.safety, estimate.pose
+        if not (
+            fence.fence_x_min_m <= pose.x_m <= fence.fence_x_max_m
+            and fence.fence_y_min_m <= pose.y_m <= fence.fence_y_max_m
+        ):
+            raise RigFault(
+                f"geofence: robot at ({pose.x_m:.3f}, {pose.y_m:.3f}) m, allowed X "
+                f"{fence.fence_x_min_m:g} to {fence.fence_x_max_m:g} m, Y "
+                f"{fence.fence_y_min_m:g} to {fence.fence_y_max_m:g} m"
+            )
+        return estimate
+
+    # -- out -----------------------------------------------------------------------------------
+
+    def _command_wheels(self, now_s: float, command: OuterCommand) -> tuple[float, float]:
+        left, right = self._parts.geometry.wheels(command.eta1_m_s, command.theta_dot_rad_s)
+        self._send_wheels(left, right)
+        self._parts.estimator.on_command(
+            now_s + self._uplink_s, command.eta1_m_s, command.theta_dot_rad_s
+        )
+        return left, right
+
+    def _send_wheels(self, left_rad_s: float, right_rad_s: float) -> None:
+        self._parts.link.send_setpoint(self._parts.rig.now_s(), left_rad_s, right_rad_s)
+
+    def _note(self, kind: str, text: str) -> None:
+        self._parts.timeline.event(self._parts.rig.now_s(), kind, text)
+
+    def _record(
+        self, now_s: float, command: OuterCommand, wheels: tuple[float, float], late: bool
+    ) -> None:
+        """Append the row of this tick; estimate, truth and reference are those of `now_s`."""
+        parts, link = self._parts, self._parts.link
+        t_s = now_s - self._t0_s
+        parts.recorder.append(
+            sample_row(
+                t_s=t_s,
+                estimate=parts.estimator.estimate_at(now_s),
+                truth=parts.rig.truth(),
+                goal_m=parts.reference.at(t_s).z1_m,
+                command=command,
+                wheels_rad_s=wheels,
+                report=self._report,
+                latency=(
+                    self._pose_time_s > self._pose_time_recorded_s,
+                    self._measurement.quality if self._measurement else math.nan,
+                    self._camera_latency_s,
+                    now_s + self._uplink_s - self._pose_time_s,
+                ),
+                link=link,
+                late=late,
+            )
+        )
+        self._pose_time_recorded_s = self._pose_time_s

@@ -1,0 +1,121 @@
+"""Does the jobs of a campaign: one run in memory each, and the loop that hands them out."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hil.core.errors import BadInput
+from hil.study.campaign.plan import Campaign, Job
+from hil.study.campaign.results import ResultStore, Row, row_of
+from hil.study.campaign.workers import in_processes, on_dask
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+Progress = Callable[[int, int], None]
+_FLUSH_PERIOD_S = 15.0
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """A row, and how long its worker was busy with it."""
+
+    row: Row
+    busy_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Totals:
+    """How a campaign went; `workers` is None on a cluster, whose size may change meanwhile."""
+
+    runs: int
+    runs_now: int
+    workers: int | None
+    wall_s: float
+    busy_s: float
+
+    @property
+    def efficiency(self) -> float | None:
+        """Return busy time / (workers x wall time), start of the workers included."""
+        if not self.workers or not self.runs_now:
+            return None
+        return self.busy_s / (self.workers * self.wall_s)
+
+
+class Worker:
+    """Runs jobs of one campaign; goes to a worker whole with each job (a few kB)."""
+
+    def __init__(self, campaign: Campaign) -> None:
+        self._campaign = campaign
+
+    def __call__(self, job: Job) -> Done:
+        """Run the job; a run that ends early has no figures."""
+        start_s = time.perf_counter()
+        row = run_job(self._campaign, job)
+        return Done(row, time.perf_counter() - start_s)
+
+
+def run_job(campaign: Campaign, job: Job) -> Row:
+    """Run one job in memory and return its row."""
+    from hil.runs.execute import RunSpec, execute_in_memory  # noqa: PLC0415 - in the worker only
+
+    try:
+        scenario = campaign.scenario(job.point)
+    except BadInput as error:  # a combination of values, each of them allowed by itself
+        return row_of(job, "refused", str(error), False, 0.0, [])
+    file = campaign.file
+    record = execute_in_memory(
+        RunSpec(
+            scenario, file.target, file.camera, job.outer, job.inner, job.seed, Path(),
+            rerun=False, command="hil sweep",
+        )
+    )  # fmt: skip
+    manifest, t_s = record.manifest, record.samples["t_s"]
+    if manifest.outcome == "interrupted":
+        raise KeyboardInterrupt
+    end_s = float(t_s[-1]) if t_s.size else 0.0
+    if manifest.outcome != "complete":
+        return row_of(job, manifest.outcome, manifest.outcome_detail, False, end_s, [])
+    holds = all(verdict.holds for verdict in record.verdicts())
+    return row_of(job, "complete", "", holds, end_s, list(record.figures().values.items()))
+
+
+def run_campaign(
+    campaign: Campaign,
+    folder: Path,
+    workers: int | None = None,
+    dask: str | None = None,
+    progress: Progress | None = None,
+) -> tuple[pa.Table, Totals]:
+    """Do what is still to do of a campaign and return all its rows, sorted.
+
+    `workers` processes of this machine (one a core), or the Dask cluster at address `dask`.
+    """
+    store = ResultStore(folder, campaign)
+    jobs = campaign.jobs()
+    todo = [job for job in jobs if job.index not in store.done]
+    count = workers or os.cpu_count() or 1
+    worker = Worker(campaign)
+    start_s = time.perf_counter()
+    results: Iterator[Done] = (
+        on_dask(worker, todo, dask) if dask else in_processes(worker, todo, count)
+    )
+    busy_s, flushed_s = 0.0, start_s
+    try:
+        for number, done in enumerate(results, start=1):
+            store.add(done.row)
+            busy_s += done.busy_s
+            if (now_s := time.perf_counter()) - flushed_s > _FLUSH_PERIOD_S:
+                flushed_s = now_s
+                store.flush()
+            if progress is not None:
+                progress(len(store.done) + number, len(jobs))
+    finally:
+        store.flush()
+    wall_s = time.perf_counter() - start_s
+    return store.finish(), Totals(len(jobs), len(todo), None if dask else count, wall_s, busy_s)

@@ -1,0 +1,352 @@
+"""The gain procedure: one search, one cost and one budget for both outer laws (docs/control.md).
+
+The caller says how runs are made (`evaluate`), so the procedure works on any target. Gains are
+searched on a logarithmic scale by CMA-ES; every candidate of both laws sees the same cases and
+the same seeds, and both laws get the same population and the same number of candidates. What was found
+is judged elsewhere (`hil.study.tuning_verdict`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from hil.config.control import Gains, PointReference
+from hil.config.events import Disturbance
+from hil.config.load import load_scenario
+from hil.core.types import wrap_pi
+from hil.record.manifest import replace_file
+
+if TYPE_CHECKING:
+    from hil.config.scenario import Scenario
+
+Figures = Mapping[str, float]
+# Figures of each run, in the order of the trials, named as in metrics.json; empty for a failed run.
+Evaluate = Callable[[Sequence["Trial"]], Sequence[Figures]]
+# (candidates done, best cost so far)
+Progress = Callable[[int, float], None]
+# name -> (least, start, largest) of what is searched, on a logarithmic scale
+Box = Mapping[str, tuple[float, float, float]]
+
+# A run's cost is the sum of weight * figure: error, time to come within 20 mm, where it rests (1 mm is
+# worth half a second of settling), and the variation of the commands (chatter) at about a tenth of the
+# whole in a calm run. ITAE in place of IAE would weigh the rest error by chance of the duration.
+COST_WEIGHTS = {
+    "iae_m_s": 1.0,
+    "settling_20mm_s": 0.1,
+    "delta1_worst_last_second_m": 50.0,
+    "eta1_variation_m_s": 0.2,
+    "theta_dot_variation_rad_s": 0.02,
+}
+# Cost of a run that gives no figure: a safety stop, a law that diverged, never within 20 mm.
+COST_FAILED = 20.0
+
+# Per law, the gains searched with their bounds, and the start: poles at -1, -2, -3 for both laws
+# (inside its layer the sliding stage has the pole -alpha/eps).
+SEARCH: dict[str, dict[str, tuple[float, float, float]]] = {
+    "asg-ism": {
+        "k1_s": (0.2, 1.0, 5.0),
+        "k2_s": (0.5, 3.0, 20.0),
+        "alpha_m_s3": (0.01, 1.0, 30.0),
+        "eps0_m_s2": (1e-3, 0.5, 5.0),
+        "eps_min_m_s2": (0.01, 0.5, 5.0),
+        "mu0_s": (0.2, 1.0, 30.0),
+        "sigma_m_s2": (1e-3, 0.01, 1.0),
+    },
+    "pid": {
+        "kp_s3": (0.3, 6.0, 200.0),
+        "ki_s4": (1e-4, 0.01, 20.0),
+        "kd1_s2": (1.0, 11.0, 200.0),
+        "kd2_s": (1.0, 6.0, 40.0),
+    },
+}
+
+
+# What pushes the robot in a pushed case: a tenth of the robot's weight along its
+# way and a twist of the same order about the vertical, at rates inside the loop's bandwidth.
+PUSHES = (
+    Disturbance(target="force_forward_n", shape="sine", amplitude=3.0, frequency_hz=0.4),
+    Disturbance(
+        target="torque_yaw_n_m", shape="sine", amplitude=0.15, frequency_hz=0.3, phase_rad=1.0
+    ),
+)
+
+
+# A late case: what a bad radio and a loaded host make of link and camera, so that gains keep a margin.
+LATE_LINK = {"latency_s": 0.05, "latency_jitter_s": 0.03}
+LATE_CAMERA = {"latency_s": 0.1, "latency_jitter_s": 0.03, "drop_ratio": 0.1}
+
+# In a beside case the robot stands at right angles to the way to the point, where neither law can do
+# anything about the error at first: z1 moves along the heading alone.
+Variant = Literal["calm", "pushed", "late", "beside"]
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One run that every candidate makes: a scenario under a variant of it, over a wheel law."""
+
+    scenario: str
+    variant: Variant
+    inner: str
+
+    def __str__(self) -> str:
+        return f"{self.scenario} {self.variant} over {self.inner}"
+
+
+# Each variant twice, over either wheel law.
+CASES = (
+    Case("scenario-1", "calm", "asg-ism"),
+    Case("scenario-1", "late", "pid"),
+    Case("scenario-2", "pushed", "pid"),
+    Case("scenario-2", "late", "asg-ism"),
+    Case("scenario-3", "pushed", "asg-ism"),
+    Case("scenario-3", "calm", "pid"),
+    Case("scenario-1", "beside", "asg-ism"),
+    Case("scenario-2", "beside", "pid"),
+)
+
+
+class Trial(NamedTuple):
+    """One run of a candidate."""
+
+    outer: str
+    gains: Gains
+    case: Case
+    seed: int
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What both laws are given alike."""
+
+    cases: tuple[Case, ...] = CASES
+    seeds: tuple[int, ...] = (1, 2)
+    candidates: int = 301
+    population: int = 10
+    search_seed: int = 1
+
+    @property
+    def trials(self) -> int:
+        """Return the runs of one law: whole populations after the start."""
+        tried = 1 + (self.candidates - 1) // self.population * self.population
+        return tried * len(self.cases) * len(self.seeds)
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """The best candidate of one law."""
+
+    values: dict[str, float]
+    cost: float
+    start_cost: float
+    candidates: int
+
+
+def run_cost(figures: Figures) -> float:
+    """Return the cost of one run; COST_FAILED at most, also where a figure is missing or NaN."""
+    cost = sum(weight * figures.get(name, math.nan) for name, weight in COST_WEIGHTS.items())
+    return min(cost, COST_FAILED) if math.isfinite(cost) else COST_FAILED
+
+
+def candidate_costs(
+    outer: str, candidates: Sequence[Gains], evaluate: Evaluate, plan: Plan
+) -> list[float]:
+    """Return each candidate's mean cost over every case and seed of the plan."""
+    trials = [
+        Trial(outer, gains, case, seed)
+        for gains in candidates
+        for case in plan.cases
+        for seed in plan.seeds
+    ]
+    costs = [run_cost(figures) for figures in evaluate(trials)]
+    each = len(plan.cases) * len(plan.seeds)
+    return [sum(costs[i : i + each]) / each for i in range(0, len(costs), each)]
+
+
+def decode(box: Box, point: Sequence[float]) -> dict[str, float]:
+    """Return the gains at a point of the unit cube, to four digits (as the file will hold them)."""
+    return {
+        name: float(f"{low * (high / low) ** min(max(u, 0.0), 1.0):.4g}")
+        for (name, (low, _, high)), u in zip(box.items(), point, strict=True)
+    }
+
+
+def with_values(base: Gains, outer: str, values: Mapping[str, float]) -> Gains:
+    """Return `base` with the searched gains of one law replaced."""
+    table = outer.replace("-", "_")
+    tree = base.model_dump()
+    tree[table].update(values)
+    return Gains.model_validate(tree)
+
+
+def minimise(
+    box: Box,
+    costs_of: Callable[[Sequence[dict[str, float]]], Sequence[float]],
+    *,
+    candidates: int,
+    population: int,
+    seed: int,
+    progress: Progress | None = None,
+) -> Found:
+    """Return the values of least cost among the candidates; deterministic by its seed.
+
+    `costs_of` is given a whole population at a time, so that it may run them side by side.
+    """
+    import cma  # noqa: PLC0415 - slow import, needed by this function alone
+
+    start = [math.log(middle / low) / math.log(high / low) for low, middle, high in box.values()]
+    options = {"bounds": [0.0, 1.0], "popsize": population, "seed": seed, "verbose": -9}
+    strategy = cma.CMAEvolutionStrategy(start, 0.15, options)
+    values = decode(box, start)
+    (start_cost,) = costs_of([values])
+    best = (start_cost, values)
+    done = 1
+    while done + population <= candidates:
+        points = strategy.ask()
+        tried = [decode(box, point) for point in points]
+        costs = costs_of(tried)
+        best = min([best, *zip(costs, tried, strict=True)], key=lambda item: item[0])
+        done += population
+        if progress is not None:
+            progress(done, best[0])
+        strategy.tell(points, list(costs))
+    return Found(best[1], best[0], start_cost, done)
+
+
+def search(
+    outer: str, base: Gains, evaluate: Evaluate, plan: Plan, progress: Progress | None = None
+) -> Found:
+    """Return the best gains of `outer` within the plan's budget; deterministic by its seeds."""
+    return minimise(
+        SEARCH[outer],
+        lambda tried: candidate_costs(
+            outer, [with_values(base, outer, values) for values in tried], evaluate, plan
+        ),
+        candidates=plan.candidates,
+        population=plan.population,
+        seed=plan.search_seed,
+        progress=progress,
+    )
+
+
+def tune(
+    base: Gains,
+    evaluate: Evaluate,
+    plan: Plan,
+    *,
+    target: str,
+    revision: str,
+    progress: Callable[[str, float], None] | None = None,
+) -> Gains:
+    """Return the tuned gains of both laws with their origin; `base` holds what is not searched.
+
+    `progress` is told the law and its best cost so far.
+    """
+
+    def searched(outer: str) -> Found:
+        told = (lambda _done, best: progress(outer, best)) if progress else None
+        return search(outer, base, evaluate, plan, told)
+
+    found = {outer: searched(outer) for outer in SEARCH}
+    return with_origin(base, found, plan, target=target, revision=revision)
+
+
+def near_bounds(gains: Gains) -> list[str]:
+    """Return what lies within 3 % of the way to an edge of its search box, where the box decided."""
+    found = []
+    for outer, box in SEARCH.items():
+        values = gains.model_dump()[outer.replace("-", "_")]
+        for name, (low, _, high) in box.items():
+            at = math.log(values[name] / low) / math.log(high / low)
+            if not 0.03 < at < 0.97:
+                found.append(f"{outer} {name} = {values[name]:g} (searched {low:g} to {high:g})")
+    return found
+
+
+def with_origin(
+    base: Gains, found: Mapping[str, Found], plan: Plan, *, target: str, revision: str
+) -> Gains:
+    """Return `base` with what was found for each law, and where it comes from."""
+    gains = base
+    origin: dict[str, Any] = {
+        "procedure": "hil.study.tune: CMA-ES on log gains, see docs/control.md",
+        "target": target,
+        "revision": revision,
+        "cases": ", ".join(map(str, plan.cases)),
+        "seeds": ", ".join(map(str, plan.seeds)),
+        "population": plan.population,
+        "search_seed": plan.search_seed,
+        "cost": " + ".join(f"{weight:g} {name}" for name, weight in COST_WEIGHTS.items()),
+    }
+    for outer, result in found.items():
+        gains = with_values(gains, outer, result.values)
+        origin[f"candidates_{outer}"] = result.candidates
+        origin[f"cost_{outer}"] = round(result.cost, 4)
+        origin[f"start_cost_{outer}"] = round(result.start_cost, 4)
+    return gains.model_copy(update={"origin": origin})
+
+
+def write_gain_set(path: Path, gains: Gains) -> None:
+    """Write a gain file as hil/data/gains holds them."""
+    lines = ["# Written by hil.study.tune; not edited by hand."]
+    for table, values in gains.model_dump().items():
+        lines += ["", f"[{table}]"]
+        lines += [
+            f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value!r}"
+            for key, value in values.items()
+        ]
+    replace_file(path, ("\n".join(lines) + "\n").encode())
+
+
+def case_scenario(case: Case, gains: Gains) -> Scenario:
+    """Return the scenario of a case with `gains` as its tuned set."""
+    scenario = load_scenario(case.scenario)
+    sets = scenario.control.gains.model_copy(update={"tuned": gains})
+    control = scenario.control.model_copy(update={"gains": sets, "gain_set": "tuned"})
+    changed: dict[str, object] = {"control": control}
+    if case.variant == "pushed":
+        changed["disturbances"] = PUSHES
+    elif case.variant == "late":
+        changed["link"] = scenario.link.model_copy(update=LATE_LINK)
+        changed["camera"] = scenario.camera.model_copy(update=LATE_CAMERA)
+    elif case.variant == "beside":
+        changed["start"] = scenario.start.model_copy(update={"theta_rad": _beside(scenario)})
+    return scenario.model_copy(update=changed)
+
+
+def _beside(scenario: Scenario) -> float:
+    """Return the heading that has the point at right angles, on the side where it is anyway."""
+    start, goal = scenario.start, scenario.reference
+    if not isinstance(goal, PointReference):
+        raise ValueError(f"{scenario.name}: a beside case needs a point")
+    bearing_rad = math.atan2(goal.y_m - start.y_m, goal.x_m - start.x_m)
+    to_left_rad = wrap_pi(bearing_rad - start.theta_rad)
+    return wrap_pi(bearing_rad - math.copysign(0.5 * math.pi, to_left_rad))
+
+
+@dataclass(frozen=True, slots=True)
+class OnTarget:
+    """Makes one run of a trial on a target; a run that ends early has no figures."""
+
+    target: str
+    camera: str
+
+    def __call__(self, trial: Trial) -> Figures:
+        """Return the figures of one run, which leaves no record behind."""
+        from hil.runs.execute import RunSpec, execute_in_memory  # noqa: PLC0415 - the search needs no target
+
+        spec = RunSpec(
+            scenario=case_scenario(trial.case, trial.gains),
+            target=self.target,
+            camera=self.camera,
+            outer=trial.outer,
+            inner=trial.case.inner,
+            seed=trial.seed,
+            out=Path(),
+            command="hil tune",
+        )
+        record = execute_in_memory(spec)
+        return record.figures().values if record.manifest.outcome == "complete" else {}

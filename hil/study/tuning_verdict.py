@@ -1,0 +1,106 @@
+"""The verdict on tuned gains: both laws on seeds that no candidate has seen, pair by pair."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from hil.analysis.stats import Paired, paired
+from hil.study.tune import SEARCH, Case, Figures, Trial, run_cost
+
+if TYPE_CHECKING:
+    from hil.config.control import Gains
+
+# The tape that judges: the scenarios as they ship, with seeds that no search uses.
+HELD_OUT_SCENARIOS = ("scenario-1", "scenario-2", "scenario-3")
+HELD_OUT_SEED = 1000
+ALL_SCENARIOS = "all"
+JUDGED = (
+    "cost",
+    "ise_m2_s",
+    "itae_m_s2",
+    "settling_20mm_s",
+    "delta1_worst_last_second_m",
+    "control_energy_m2_s3",
+    "theta_dot_variation_rad_s",
+    "pwm_variation_counts",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """ASG-ISM - PID on held-out seeds: by scenario (and over all of them), by figure.
+
+    `failed` counts each law's runs without figures; their pairs cost COST_FAILED and are left out
+    of the other figures.
+    """
+
+    seeds: tuple[int, ...]
+    differences: dict[str, dict[str, Paired]]
+    failed: dict[str, int]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the verdict for a JSON document."""
+        return {
+            "seeds": list(self.seeds),
+            "failed": self.failed,
+            "asg-ism - pid": {
+                scenario: {name: result.to_json() for name, result in table.items()}
+                for scenario, table in self.differences.items()
+            },
+        }
+
+
+def held_out_trials(gains: Gains, repeats: int) -> list[Trial]:
+    """Return the runs of the held-out tape, both laws with equal seeds."""
+    return [
+        Trial(outer, gains, Case(scenario, "calm", "asg-ism"), seed)
+        for seed in range(HELD_OUT_SEED, HELD_OUT_SEED + repeats)
+        for scenario in HELD_OUT_SCENARIOS
+        for outer in SEARCH
+    ]
+
+
+def judge(trials: Sequence[Trial], figures: Sequence[Figures]) -> Verdict:
+    """Return the verdict on the runs of a held-out tape."""
+    values: dict[str, dict[str, dict[str, list[float]]]] = {
+        scenario: {name: {outer: [] for outer in SEARCH} for name in JUDGED}
+        for scenario in (ALL_SCENARIOS, *HELD_OUT_SCENARIOS)
+    }
+    for trial, found in zip(trials, figures, strict=True):
+        known = {**found, "cost": run_cost(found)}
+        for scenario in (ALL_SCENARIOS, trial.case.scenario):
+            for name in JUDGED:
+                values[scenario][name][trial.outer].append(known.get(name, math.nan))
+    return Verdict(
+        seeds=tuple(dict.fromkeys(trial.seed for trial in trials)),
+        differences={
+            scenario: {
+                name: paired(by_law["pid"], by_law["asg-ism"]) for name, by_law in table.items()
+            }
+            for scenario, table in values.items()
+        },
+        failed={
+            outer: sum(
+                not found for trial, found in zip(trials, figures, strict=True)
+                if trial.outer == outer
+            )
+            for outer in SEARCH
+        },
+    )  # fmt: skip
+
+
+def with_verdict(gains: Gains, verdict: Verdict) -> Gains:
+    """Return the gains with what the held-out tape says of their cost in their origin."""
+    cost = verdict.differences[ALL_SCENARIOS]["cost"]
+    told: dict[str, str | int | float] = {
+        "held_out": f"{', '.join(HELD_OUT_SCENARIOS)}, seeds {verdict.seeds[0]} to "
+        f"{verdict.seeds[-1]}",
+        "held_out_cost_pid": round(cost.baseline_mean, 4),
+        "held_out_cost_asg-ism": round(cost.other_mean, 4),
+        "held_out_cost_difference": f"{cost.mean:.4f}, 95 % {cost.interval.low:.4f} to "
+        f"{cost.interval.high:.4f}",
+    }
+    return gains.model_copy(update={"origin": gains.origin | told})

@@ -1,0 +1,1 @@
+"""Tools beside a run: bring-up, doctor, localise, twin server, bridge, benches."""

@@ -1,0 +1,111 @@
+"""The project's own speed figures on this machine: medians of several runs, never a test."""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from hil.config.load import load_scenario
+from hil.rigs.opening import open_rig
+from hil.runs.execute import RunSpec, execute
+from sim_twin.pil import pil_is_missing
+
+_SCENARIO = "scenario-1"
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One speed figure: median, least and largest of `runs` runs; `goal` is what it should reach."""
+
+    name: str
+    unit: str
+    median: float
+    least: float
+    largest: float
+    runs: int
+    goal: str
+
+
+def measure(name: str, unit: str, goal: str, runs: int, once: Callable[[], float]) -> Figure:
+    """Return the figure of `once`, called `runs` times after one call that is not counted."""
+    once()
+    values = sorted(once() for _ in range(runs))
+    return Figure(name, unit, statistics.median(values), values[0], values[-1], runs, goal)
+
+
+def real_time_factor(camera: str, *, target: str = "twin", record: bool = True) -> float:
+    """Return simulated seconds per wall second of one whole run, record included.
+
+    The simulated time is all that passed on the rig: connecting, the controlled part, stopping.
+    """
+    scenario = load_scenario(_SCENARIO)
+    with tempfile.TemporaryDirectory() as folder:
+        spec = RunSpec(
+            scenario=scenario,
+            target=target,
+            camera=camera,
+            outer="asg-ism",
+            inner="asg-ism",
+            seed=1,
+            out=Path(folder) / "run",
+            rerun=record,
+            command="hil bench",
+        )
+        start_s = time.perf_counter()
+        rig = open_rig(spec.target, scenario, spec.camera, spec.seed)
+        begin_s = rig.now_s()
+        execute(spec, rig=rig)
+        return (rig.now_s() - begin_s) / (time.perf_counter() - start_s)
+
+
+def kernel_step_us() -> float:
+    """Return microseconds of wall time per 1e-4 s step of plant, firmware and encoders."""
+    from random import Random  # noqa: PLC0415 - only for this figure
+
+    from sim_twin.setup import STEP_US, make_kernel  # noqa: PLC0415
+
+    kernel = make_kernel(load_scenario(_SCENARIO).robot, 57_600, Random(1))
+    steps = 50_000
+    start_s = time.perf_counter()
+    end_us = steps * STEP_US
+    while kernel.advance(end_us) < end_us:
+        kernel.take_sent()
+    return (time.perf_counter() - start_s) / steps * 1e6
+
+
+def help_s() -> float:
+    """Return the wall time of `hil --help` as a process of its own."""
+    start_s = time.perf_counter()
+    subprocess.run([sys.executable, "-m", "hil", "--help"], check=True, stdout=subprocess.DEVNULL)
+    return time.perf_counter() - start_s
+
+
+def figures(runs: int) -> list[Figure]:
+    """Return every figure; some tens of seconds in all. `pil` is left out where it cannot run."""
+    plans: list[tuple[str, str, str, Callable[[], float]]] = [
+        ("whole loop, rendered camera", "x real time", ">= 10",
+         lambda: real_time_factor("rendered")),
+        ("whole loop, --camera pose", "x real time", ">= 100",
+         lambda: real_time_factor("pose", record=False)),
+        ("whole loop, --camera pose, with Rerun file", "x real time", "",
+         lambda: real_time_factor("pose")),
+        ("whole loop on pil, rendered camera", "x real time", ">= 2",
+         lambda: real_time_factor("rendered", target="pil")),
+        ("twin and firmware, one step of 1e-4 s", "us", "<= 0.4", kernel_step_us),
+        ("hil --help", "s", "< 0.3", help_s),
+    ]  # fmt: skip
+    if pil_is_missing():
+        plans = [plan for plan in plans if "on pil" not in plan[0]]
+    return [measure(name, unit, goal, runs, once) for name, unit, goal, once in plans]
+
+
+def as_document(found: list[Figure]) -> dict[str, Any]:
+    """Return what `hil bench --json` prints."""
+    return {"figures": [asdict(figure) for figure in found]}

@@ -1,0 +1,199 @@
+"""The twin served in real time: its link on a pseudo-terminal, its camera on a Unix socket.
+
+Any program meets the pseudo-terminal as it would meet the board's port (radio included), and
+whoever opens the socket gets every camera frame from then on, in the form of
+`hil.rigs.frames.encode_frame`. The twin's own virtual clock is only told to follow this
+machine's.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import selectors
+import socket
+import time
+import tty
+from collections import deque
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hil.core.errors import BadInput
+from hil.rigs.frames import encode_frame
+from hil.wire import dialect
+from hil.wire.framing import FrameReader
+
+if TYPE_CHECKING:
+    from hil.core.rig import Rig
+
+# The twin's events are looked for this often; bytes and frames are late by no more.
+_STEP_S = 0.001
+# Frames kept for a client that reads slowly; beyond that the oldest are dropped, as by a camera.
+_BACKLOG_FRAMES = 4
+
+
+class PseudoTerminal:
+    """The board's port: a raw pseudo-terminal with a stable name."""
+
+    def __init__(self, link: Path) -> None:
+        self._link = link
+        self._master, self._slave = os.openpty()  # the slave stays open, or a hang-up ends it all
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        _replace_link(link, os.ttyname(self._slave))
+
+    def fileno(self) -> int:
+        """Return the descriptor that is readable when the host has sent bytes."""
+        return self._master
+
+    def read(self) -> bytes:
+        """Return what the host has sent, b"" if nothing."""
+        try:
+            return os.read(self._master, 4096)
+        except BlockingIOError:
+            return b""
+
+    def write(self, data: bytes) -> None:
+        """Hand bytes to the host; what nobody reads is lost, as on the air."""
+        with contextlib.suppress(BlockingIOError):
+            os.write(self._master, data)
+
+    def close(self) -> None:
+        """Remove the name and close both ends."""
+        with contextlib.suppress(OSError):
+            self._link.unlink()
+        os.close(self._master)
+        os.close(self._slave)
+
+
+def _replace_link(link: Path, device: str) -> None:
+    """Make `link` point at the device; a link left by an earlier server is replaced."""
+    try:
+        if link.is_symlink():
+            link.unlink()
+        link.parent.mkdir(parents=True, exist_ok=True)
+        link.symlink_to(device)
+    except OSError as error:
+        raise BadInput(
+            f"--pty {link}: {error.strerror}; choose a path that does not exist"
+        ) from None
+
+
+class FrameServer:
+    """The camera: a listening Unix socket, and what is still to be sent to each client."""
+
+    def __init__(self, path: Path, selector: selectors.BaseSelector) -> None:
+        self._path = path
+        self._selector = selector
+        self._clients: dict[socket.socket, deque[memoryview]] = {}
+        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            if path.is_socket():
+                path.unlink()
+            self._listener.bind(str(path))
+        except OSError as error:
+            self._listener.close()
+            raise BadInput(f"--frames {path}: {error.strerror}; choose another path") from None
+        self._listener.listen()
+        self._listener.setblocking(False)
+        selector.register(self._listener, selectors.EVENT_READ, self._accept)
+
+    @property
+    def wanted(self) -> bool:
+        """True while somebody looks at the camera."""
+        return bool(self._clients)
+
+    def _accept(self) -> None:
+        client, _ = self._listener.accept()
+        client.setblocking(False)
+        self._clients[client] = deque()
+
+    def send(self, frame: bytes) -> None:
+        """Queue one frame for every client; a client that lags keeps the newest frames only."""
+        for queue in self._clients.values():
+            # The head may be half sent and must stay.
+            while len(queue) > _BACKLOG_FRAMES:
+                del queue[1]
+            queue.append(memoryview(frame))
+
+    def flush(self) -> None:
+        """Send what the sockets take now; forget clients that have gone."""
+        for client, queue in list(self._clients.items()):
+            try:
+                while queue:
+                    sent = client.send(queue[0])
+                    if sent < len(queue[0]):
+                        queue[0] = queue[0][sent:]
+                    else:
+                        queue.popleft()
+            except BlockingIOError:
+                continue
+            except OSError:
+                client.close()
+                del self._clients[client]
+
+    def close(self) -> None:
+        """Close every socket and remove the path."""
+        self._selector.unregister(self._listener)
+        for client in (*self._clients, self._listener):
+            client.close()
+        with contextlib.suppress(OSError):
+            self._path.unlink()
+
+
+class TwinServer:
+    """Lets a simulated rig follow this machine's clock and passes its bytes and frames on."""
+
+    def __init__(self, rig: Rig, pty: Path, frames: Path) -> None:
+        self._rig = rig
+        self._selector = selectors.DefaultSelector()
+        self.port = PseudoTerminal(pty)
+        try:
+            self._camera = FrameServer(frames, self._selector)
+        except BadInput:
+            self.port.close()
+            raise
+        self._selector.register(self.port, selectors.EVENT_READ, self._from_host)
+        self._watcher = FrameReader()
+        self._armed = False
+        self.worst_lag_s = 0.0
+
+    def run(self, until_s: float) -> None:
+        """Serve until this machine's monotonic clock shows `until_s`."""
+        ahead_s = self._rig.now_s() - time.monotonic()
+        while (now_s := time.monotonic()) < until_s:
+            self.worst_lag_s = max(self.worst_lag_s, now_s + ahead_s - self._rig.now_s())
+            self._follow(now_s + ahead_s)
+            for key, _ in self._selector.select(_STEP_S):
+                key.data()
+
+    def _follow(self, t_s: float) -> None:
+        """Let the twin's time pass to `t_s` and hand out what it has sent by then."""
+        while self._rig.now_s() < t_s:
+            self._rig.wait(t_s)
+            if data := self._rig.stream.read():
+                self._watch(data)
+                self.port.write(data)
+            while (frame := self._rig.poll_frame()) is not None:
+                if self._camera.wanted:
+                    self._camera.send(encode_frame(frame))
+        self._camera.flush()
+
+    def _from_host(self) -> None:
+        if data := self.port.read():
+            self._rig.stream.write(data)
+
+    def _watch(self, data: bytes) -> None:
+        """Let the scenario's timed events begin when the board is armed."""
+        for msg_id, message, _ in self._watcher.feed(data):
+            if msg_id == dialect.MAVLINK_MSG_ID_WHEEL_STATE:
+                armed = message.state == dialect.HIL_STATE_ARMED
+                if armed and not self._armed:
+                    self._rig.begin(self._rig.now_s())
+                self._armed = armed
+
+    def close(self) -> None:
+        """Remove the pseudo-terminal and the socket."""
+        self._camera.close()
+        self._selector.close()
+        self.port.close()
