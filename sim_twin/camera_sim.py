@@ -26,6 +26,7 @@ from hil.config.camera import (
 )
 from hil.core.errors import BadInput
 from sim_twin import _native
+from vision.camera_setup import camera_model
 
 TEXTURE_SIZE = 800
 TEXTURE_PERIOD_M = 2.0  # about; a whole number of tiles
@@ -56,7 +57,7 @@ class RenderedCamera:
 
 
 def _view(camera: CameraConfig) -> _native.View:
-    model = camera.model()
+    model = camera_model(camera)
     view = _native.View()
     view.width, view.height = model.width_px, model.height_px
     view.fx, view.fy, view.cx, view.cy = model.fx_px, model.fy_px, model.cx_px, model.cy_px

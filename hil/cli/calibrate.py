@@ -10,6 +10,7 @@ import click
 
 from hil.cli.options import json_option, print_json
 from hil.core.errors import BadInput
+from vision.camera_setup import camera_model
 
 if TYPE_CHECKING:
     from vision.calibration.boards import Board
@@ -236,7 +237,7 @@ def _lens_for(
     config = files.read_camera(file)
     for name, image in images:
         files.require_size(config, image.shape[1::-1], str(file), name)
-    return (config.width_px, config.height_px), config.model()
+    return (config.width_px, config.height_px), camera_model(config)
 
 
 def _pairs(

@@ -7,14 +7,11 @@ pixel value is its reflectance times the local light. DN is the sensor's 8-bit s
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from hil.config.base import Section
-
-if TYPE_CHECKING:
-    from vision.camera import CameraModel
 
 Reflectance = Annotated[float, Field(ge=0.0, le=1.0)]
 Colour = tuple[Reflectance, Reflectance, Reflectance]
@@ -264,33 +261,3 @@ class CameraConfig(Section):
     marks: MarksConfig = MarksConfig()
     robot_look: RobotLookConfig = RobotLookConfig()
     scene: SceneConfig = SceneConfig()
-
-    def model(self) -> CameraModel:
-        """Return the camera model at the configured resolution."""
-        # Here and not above: numpy costs the command line a tenth of a second it seldom needs.
-        import numpy as np  # noqa: PLC0415
-
-        from vision.camera import CameraModel, look_at  # noqa: PLC0415
-        from vision.correction import with_shift  # noqa: PLC0415
-
-        lens, pose = self.lens, self.pose
-        rotation = (
-            look_at(pose.eye_m, pose.target_m)
-            if pose.R_world_cam is None
-            else np.array(pose.R_world_cam)
-        )
-        reference = CameraModel(
-            lens.at_width_px,
-            lens.at_height_px,
-            lens.fx_px,
-            lens.fy_px,
-            lens.cx_px,
-            lens.cy_px,
-            (lens.k1, lens.k2, lens.p1, lens.p2, lens.k3),
-            rotation,
-            np.array(pose.eye_m),
-        )
-        if lens.shift_degree:
-            shift = np.column_stack((lens.shift_u, lens.shift_v))
-            reference = with_shift(reference, lens.shift_degree, shift)
-        return reference.scaled(self.width_px, self.height_px)

@@ -18,20 +18,12 @@ from hil.config.scenario import Scenario
 from hil.core.errors import BadInput, RigFault
 from hil.core.types import Estimate, OuterCommand, OuterLaw, ReferenceState
 from hil.record import layout
-from hil.record.manifest import Manifest, read_manifest
 from hil.record.memory import MemoryRecorder
-from hil.record.reader import altered_files, read_table
 from hil.record.schema import FRAME_NAMES, SAMPLE_NAMES
-from hil.record.tape import Tape, read_tape
-from hil.record.tlog import LoggedFrame, read_tlog
+from hil.record.source import Source, read_source
+from hil.record.tlog import LoggedFrame
 from hil.replays.divergence import Channel, compare_columns, compare_link
-from hil.rigs.opening import true_robot
-from hil.rigs.replay import (
-    ReplayRig,
-    recorded_frames,
-    recorded_images,
-    recorded_truths,
-)
+from hil.rigs.replay import open_replay
 from hil.runs.execute import RunSpec, board_parameters, make_parts
 from hil.runs.session import Ending, Session
 from hil.wire.identity import board_hashes
@@ -46,24 +38,6 @@ COMMANDS = ("eta1_cmd_m_s", "theta_dot_cmd_rad_s", "omega_cmd_left_rad_s", "omeg
 # Taken over from the record to complete the rows, not computed again.
 _GIVEN = tuple(name for name in SAMPLE_NAMES if name.startswith("true_"))
 _FRAME_CHECKS = tuple(name for name in FRAME_NAMES if name not in {"t_cam_s", "index"})
-
-
-@dataclass(frozen=True, slots=True)
-class Source:
-    """What a replay needs of a record, as far as it is intact; `problems` says what is not."""
-
-    path: Path
-    manifest: Manifest
-    tape: Tape
-    samples: Columns
-    frames: Columns
-    link: tuple[LoggedFrame, ...]
-    problems: tuple[str, ...]
-
-    @property
-    def has_video(self) -> bool:
-        """Say whether every frame was kept, so that the localiser can be replayed too."""
-        return (self.path / layout.CAMERA).is_file()
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,45 +91,6 @@ class ReplayReport:
             "channels": [channel.to_json() for channel in self.channels],
             "problems": list(self.problems),
         }
-
-
-def read_source(path: Path) -> Source:
-    """Return what is intact of a record; raises BadInput when nothing can be replayed."""
-    manifest = read_manifest(path)
-    if not (path / layout.TAPE).is_file():
-        raise BadInput(f"{path}: has no {layout.TAPE}: recorded without one, nothing to replay")
-    problems = altered_files(path, manifest)
-    if manifest.outcome == "running":
-        problems.append("cut off in mid-run: the record was never closed")
-    tape = read_tape(path / layout.TAPE)
-    if not tape.entries:
-        raise BadInput(f"{path}: {layout.TAPE} is empty: nothing to replay (an imported log?)")
-    if tape.problem:
-        problems.append(tape.problem)
-    tables = []
-    for finished, journal in (
-        (layout.SAMPLES, layout.SAMPLES_JOURNAL),
-        (layout.FRAMES, layout.FRAMES_JOURNAL),
-    ):
-        try:
-            tables.append(read_table(path, finished, journal, required=True))
-        except BadInput as error:
-            problems.append(str(error))
-            tables.append({})
-    samples, frames = tables
-    link = tuple(read_tlog(path / layout.LINK)) if (path / layout.LINK).is_file() else ()
-    return Source(path, manifest, tape, samples, frames, link, tuple(problems))
-
-
-def open_replay(source: Source, recorded: Scenario) -> ReplayRig:
-    """Return the rig that a record makes; `recorded` is its scenario."""
-    video = source.path / layout.CAMERA
-    images: Iterator[Any] = recorded_images(video) if source.has_video else iter(())
-    return ReplayRig(
-        source.tape,
-        recorded_frames(source.frames, images),
-        recorded_truths(source.samples, true_robot(recorded).d0_m),
-    )
 
 
 def replay(

@@ -24,7 +24,7 @@ from hil.config.load import build, check_board, set_value
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
 from hil.record import layout
-from hil.replays.exact import Source, read_source
+from hil.record.source import Source, read_source
 from hil.runs.execute import board_parameters
 from hil.wire import dialect
 from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM, FrameReader, FrameWriter

@@ -19,9 +19,9 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from hil.board._firmware import PWM_TOP
+from hil.config.mismatch import true_robot
 from hil.core.errors import BadInput
 from hil.replays.firmware import Sent, Trace, decoded, read_reports, sent_frames
-from hil.rigs.opening import true_robot
 from hil.runs.execute import board_parameters
 from hil.wire import dialect
 from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM, FrameWriter
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hil.config.scenario import Scenario
-    from hil.replays.exact import Source
+    from hil.record.source import Source
 
     Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from hil.analysis.stats import Paired, paired
 from hil.config.load import build, with_overrides
 from hil.config.scenario import Scenario, StartPose
 from hil.record import layout
-from hil.replays.exact import read_source
+from hil.record.source import read_source
 from hil.replays.fit import UNITS, Fit, Rehearsal, fit_twin
 from hil.report.compare import HEADLINES
 from hil.report.repeats import verdict

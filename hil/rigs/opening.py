@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hil.config.load import build
-from hil.config.robot import RobotConfig
+from hil.config.mismatch import true_robot
 from hil.core.errors import BadInput
 
 if TYPE_CHECKING:
@@ -36,24 +35,12 @@ def open_rig(target: str, scenario: Scenario, camera: str, seed: int) -> Rig:
         return SerialRig(device, baud, open_source(camera, scenario.camera))
     if target.startswith("replay:"):
         from hil.config.scenario import Scenario as Recorded  # noqa: PLC0415
-        from hil.replays.exact import open_replay, read_source  # noqa: PLC0415
+        from hil.record.source import read_source  # noqa: PLC0415
+        from hil.rigs.replay import open_replay  # noqa: PLC0415
 
         source = read_source(Path(target.removeprefix("replay:")))
         return open_replay(source, build(Recorded, source.manifest.scenario, str(source.path)))
     raise BadInput(f"target {target!r}: unknown; choose twin, pil, serial:DEV[@BAUD] or replay:RUN")
-
-
-def true_robot(scenario: Scenario) -> RobotConfig:
-    """Return the robot as it really is: the believed one with the scenario's mismatch applied."""
-    tree = scenario.robot.model_dump()
-    for key, ratio in scenario.mismatch.items():
-        *path, leaf = key.split(".")
-        try:
-            table: dict[str, Any] = reduce(lambda node, part: node[part], path, tree)
-            table[leaf] = float(table[leaf]) * ratio
-        except (KeyError, TypeError, ValueError):
-            raise BadInput(f"mismatch.{key}: not a number of the robot's file") from None
-    return build(RobotConfig, tree, "mismatch")
 
 
 def twin_setup(scenario: Scenario, seed: int) -> Any:

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import cv2
 import numpy as np
 
+from hil.config.mismatch import true_robot
 from hil.core.errors import RigFault
 from hil.core.rig import Frame, Truth
 from hil.core.types import Pose, PoseMeasurement
-from hil.record import tape
+from hil.record import layout, tape
 from hil.record.tick_rows import MARKS
 
 if TYPE_CHECKING:
@@ -24,8 +25,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from hil.config.scenario import Scenario
     from hil.core.rig import ByteStream
     from hil.record.journal import Columns
+    from hil.record.source import Source
 
 END = "replay: the record ends here"
 
@@ -194,3 +197,14 @@ def recorded_truths(samples: Columns, d0_m: float) -> Iterator[Truth | None]:
             continue
         z1_m = (x + d0_m * math.cos(theta), y + d0_m * math.sin(theta))
         yield Truth(Pose(x, y, theta), eta1, theta_dot, z1_m)
+
+
+def open_replay(source: Source, recorded: Scenario) -> ReplayRig:
+    """Return the rig that a record makes; `recorded` is its scenario."""
+    video = source.path / layout.CAMERA
+    images: Iterator[Any] = recorded_images(video) if source.has_video else iter(())
+    return ReplayRig(
+        source.tape,
+        recorded_frames(source.frames, images),
+        recorded_truths(source.samples, true_robot(recorded).d0_m),
+    )

@@ -25,6 +25,7 @@ from hil.runs.interruption import CtrlC
 from hil.runs.session import Parts, Progress, Publish, Session
 from hil.wire.identity import board_hashes
 from hil.wire.link import BoardLink
+from vision.camera_setup import camera_model
 from vision.marks import MarkLocaliser
 
 if TYPE_CHECKING:
@@ -149,7 +150,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink) -> Parts:
         rig=rig,
         link=BoardLink(rig.stream, timeline.link_frame),
         camera_clock=CameraClock(scenario.camera.latency_s),
-        localiser=MarkLocaliser(scenario.camera.model(), scenario.camera.marks),
+        localiser=MarkLocaliser(camera_model(scenario.camera), scenario.camera.marks),
         estimator=make_estimator(control.estimator, control.fusion, geometry),
         law=make_outer_law(spec.outer, control.active_gains, control.limits, robot.d0_m),
         reference=make_reference(scenario.reference),

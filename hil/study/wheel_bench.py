@@ -19,8 +19,8 @@ import numpy as np
 from hil.board import _firmware
 from hil.config.events import Disturbance, Fault, Zone
 from hil.config.load import load_scenario
+from hil.config.mismatch import true_robot
 from hil.core.errors import BadInput, RigFault
-from hil.rigs.opening import true_robot
 from hil.wire import dialect
 from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM, FrameReader, FrameWriter
 from hil.wire.identity import dialect_hash, parameter_hash

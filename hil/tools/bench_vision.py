@@ -29,6 +29,7 @@ from hil.config.camera import (
 )
 from hil.core.types import Pose, PoseMeasurement, wrap_pi
 from sim_twin.camera_sim import RenderedCamera
+from vision.camera_setup import camera_model
 from vision.marks import MarkLocaliser
 from vision.tracker import Tracker
 
@@ -146,7 +147,7 @@ def row(view: View, size_px: tuple[int, int], condition: str, frames: int) -> Ro
     """Return one line of the table; two runs differ in the times alone."""
     camera = camera_in(view, size_px, condition)
     rendered = RenderedCamera(camera, seed=1)
-    localiser = MarkLocaliser(camera.model(), camera.marks)
+    localiser = MarkLocaliser(camera_model(camera), camera.marks)
     tracker = Tracker(localiser, camera.search_radius_m)
     tracked: list[tuple[float, float]] = []
     acquired: list[tuple[float, float]] = []
@@ -221,7 +222,7 @@ def empty_scenes(frames: int, progress: Progress | None = None) -> Empty:
         look = SceneConfig(clutter=clutter(rng), read_noise_dn=3.0, full_well_e=3000.0)
         camera = CameraConfig(pose=pose, scene=look, robot_look=RobotLookConfig())
         rendered = RenderedCamera(camera, seed=scene)
-        localiser = MarkLocaliser(camera.model(), camera.marks)
+        localiser = MarkLocaliser(camera_model(camera), camera.marks)
         for index in range(min(EMPTY_FRAMES_PER_SCENE, frames - done)):
             seen = localiser.locate(rendered.make(index, ()), None, 0.0)
             accepted += seen.pose is not None

@@ -20,6 +20,7 @@ from hil.core.types import Pose, PoseMeasurement
 from vision.calibration import figures
 from vision.calibration.files import read_camera, require_size
 from vision.camera import CameraModel
+from vision.camera_setup import camera_model
 from vision.cv_compat import dictionary_size, require_place, write_atomic
 from vision.marks import MarkLocaliser
 from vision.sources import ImageFolder, VideoFile
@@ -53,7 +54,7 @@ def localise(
     config = read_camera(camera_file)
     frames = ImageFolder(source) if source.is_dir() else VideoFile(source)
     require_size(config, (frames.width_px, frames.height_px), str(camera_file), str(source))
-    model = config.model()
+    model = camera_model(config)
     tracker = Tracker(_localiser(config, model, tag_text), config.search_radius_m)
     rows: list[tuple[Any, ...]] = []
     measured: list[PoseMeasurement] = []

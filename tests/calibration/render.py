@@ -11,6 +11,7 @@ import numpy as np
 from hil.config.camera import CameraConfig
 from vision.calibration.boards import tag_cells
 from vision.camera import look_at
+from vision.camera_setup import camera_model
 
 SUPERSAMPLING = 2
 TEXTURE_M_PX = 0.25e-3
@@ -18,7 +19,7 @@ PAPER_RIM_M = 0.012
 GROUND_DN, PAPER_DN, INK_DN = 110.0, 215.0, 25.0
 
 # The twin's lens, before a camera that looks along world z.
-LENS = replace(CameraConfig().model(), R_world_cam=np.eye(3), t_world_cam_m=np.zeros(3))
+LENS = replace(camera_model(CameraConfig()), R_world_cam=np.eye(3), t_world_cam_m=np.zeros(3))
 
 
 @dataclass(frozen=True)

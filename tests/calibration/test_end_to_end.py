@@ -19,6 +19,7 @@ from sim_twin.camera_sim import RenderedCamera
 from tests.calibration.render import LENS, TagFloor, board_image, hand_held
 from vision.calibration.boards import parse_board
 from vision.calibration.files import Table, read_camera, update_camera
+from vision.camera_setup import camera_model
 from vision.cv_compat import read_image, write_image
 from vision.marks import MarkLocaliser
 
@@ -43,7 +44,7 @@ def lab(tmp_path_factory):
     """Make a lab with the twin's camera: pictures of boards, of tags on the floor, and of the robot."""
     folder = tmp_path_factory.mktemp("lab")
     config = CameraConfig()
-    camera = config.model()
+    camera = camera_model(config)
     board = parse_board(BOARD)
     (folder / "boards").mkdir()
     for k, (R, t) in enumerate(hand_held(board, 10)):
@@ -82,7 +83,7 @@ def calibrated(lab):
 def test_poses_over_the_floor_with_everything_calibrated(lab, calibrated):
     """At most 3 mm and 0.3 deg RMS over the floor, with a survey good to 1 mm."""
     config = read_camera(lab.file)
-    localiser = MarkLocaliser(config.model(), config.marks)
+    localiser = MarkLocaliser(camera_model(config), config.marks)
     rng = np.random.default_rng(11)
     off = []
     for k in range(30):

@@ -10,6 +10,7 @@ from hil.core.errors import BadInput
 from hil.core.types import Pose, PoseMeasurement, wrap_pi
 from sim_twin.camera_sim import RenderedCamera
 from vision import cv_compat
+from vision.camera_setup import camera_model
 from vision.pose_fit import fit_pose
 from vision.tags import TagLocaliser
 from vision.tracker import Tracker
@@ -21,7 +22,7 @@ def rig(width_px=1280, height_px=720, **look):
     config = CameraConfig.model_validate(
         {"width_px": width_px, "height_px": height_px, "robot_look": {"tag": look}}
     )
-    localiser = TagLocaliser(config.model(), config.robot_look.tag, config.marks.height_m)
+    localiser = TagLocaliser(camera_model(config), config.robot_look.tag, config.marks.height_m)
     return RenderedCamera(config, 1), localiser, config
 
 
@@ -66,12 +67,12 @@ def test_a_tag_beside_the_centre_of_mass_is_taken_back_to_it():
 def test_height_left_out_moves_the_pose_by_the_rays_lean():
     """Negative control: told 0 m for 0.1 m, the tag seems too large and is refused."""
     camera, _, config = rig()
-    wrong = TagLocaliser(config.model(), config.robot_look.tag, 0.0)
-    tall = TagLocaliser(config.model(), config.robot_look.tag, 0.08)
+    wrong = TagLocaliser(camera_model(config), config.robot_look.tag, 0.0)
+    tall = TagLocaliser(camera_model(config), config.robot_look.tag, 0.08)
     pose = (0.4, 0.3, 0.5)
     image = frame(camera, 0, pose)
     seen = tall.locate(image, None, RADIUS_M).pose
-    lean = config.model().lean(*config.model().project_point(0.4, 0.3, 0.1))
+    lean = camera_model(config).lean(*camera_model(config).project_point(0.4, 0.3, 0.1))
     assert (seen.x_m - 0.4, seen.y_m - 0.3) == pytest.approx(
         (-0.02 * lean[0], -0.02 * lean[1]), abs=4e-4
     )
@@ -107,14 +108,14 @@ def test_reasons_for_not_seeing():
     assert localiser.locate(camera.make(0, []), None, RADIUS_M).reason == "tag 7 not found"
     image = frame(camera, 0, (0.0, 0.0, 0.0))
     other = config.robot_look.tag.model_copy(update={"tag_id": 8})
-    assert TagLocaliser(config.model(), other, 0.1).locate(image, None, RADIUS_M).pose is None
+    assert TagLocaliser(camera_model(config), other, 0.1).locate(image, None, RADIUS_M).pose is None
     small = config.robot_look.tag.model_copy(update={"size_m": 0.06})
-    seen = TagLocaliser(config.model(), small, 0.1).locate(image, None, RADIUS_M)
+    seen = TagLocaliser(camera_model(config), small, 0.1).locate(image, None, RADIUS_M)
     assert seen.pose is None
     assert "tag has 60.0 mm" in seen.reason
     unknown = config.robot_look.tag.model_copy(update={"dictionary": "DICT_3X3"})
     with pytest.raises(BadInput, match="DICT_3X3"):
-        TagLocaliser(config.model(), unknown, 0.1)
+        TagLocaliser(camera_model(config), unknown, 0.1)
 
 
 def test_shapes_of_both_opencv_versions_become_one():

@@ -18,6 +18,7 @@ from vision.calibration.boards import BoardView, inner_corners, parse_board
 from vision.calibration.files import read_camera
 from vision.calibration.points import read_pairs
 from vision.calibration.views import Picker, views_of_camera, views_of_video
+from vision.camera_setup import camera_model
 from vision.correction import CorrectedCamera
 from vision.cv_compat import write_image
 
@@ -104,7 +105,7 @@ def test_listed_points_fit_lens_pose_and_correction(tmp_path):
     said = floor(*options, "--correct", "2", "--picture", tmp_path / "grid.png")
     assert said["points"] == 69
     assert any("--camera-height" in advice for advice in said["advice"])
-    model = read_camera(file).model()
+    model = camera_model(read_camera(file))
     assert isinstance(model, CorrectedCamera)
     pairs = read_pairs(ARENA)
     off = model.floor_points(pairs.px) - pairs.world_m[:, :2]

@@ -9,7 +9,7 @@ import pytest
 from hil.config.load import build
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
-from hil.replays.exact import read_source
+from hil.record.source import read_source
 from hil.replays.fit import Fit, Rehearsal, fit_twin
 from hil.replays.what_if import what_if
 from tests.replay.records import record

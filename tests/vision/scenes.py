@@ -10,6 +10,7 @@ import numpy as np
 from hil.config.camera import CameraConfig
 from hil.core.types import Pose, wrap_pi
 from sim_twin.camera_sim import RenderedCamera
+from vision.camera_setup import camera_model
 from vision.marks import MarkLocaliser
 
 # Two views, far apart in tilt: the default one and one at 45 degrees.
@@ -23,7 +24,7 @@ def rendered(camera: CameraConfig = DEFAULT, seed: int = 1) -> RenderedCamera:
 
 
 def localiser(camera: CameraConfig = DEFAULT) -> MarkLocaliser:
-    return MarkLocaliser(camera.model(), camera.marks)
+    return MarkLocaliser(camera_model(camera), camera.marks)
 
 
 def at_rest(pose: Pose, camera: CameraConfig = DEFAULT, index: int = 0) -> np.ndarray:

@@ -20,6 +20,7 @@ from tests.vision.scenes import (
     rendered,
     rms,
 )
+from vision.camera_setup import camera_model
 from vision.marks import MarkLocaliser
 
 HERE = Pose(0.2, 0.1, 0.4)
@@ -125,7 +126,7 @@ def test_reasons_when_not_seen():
     assert "ground" in seen.reason
     # Negative control: with that gate opened, the same two discs are the robot.
     marks = DEFAULT.marks.model_copy(update={"ground_ratio_max": 10.0})
-    opened = MarkLocaliser(DEFAULT.model(), marks).locate(bare, HERE, 0.06)
+    opened = MarkLocaliser(camera_model(DEFAULT), marks).locate(bare, HERE, 0.06)
     assert opened.pose is not None
     assert math.hypot(*errors(opened.pose, HERE)[:2]) < 0.5e-3
 
@@ -163,10 +164,10 @@ def test_a_mark_height_left_out_fails_the_accuracy_limit():
     """
     pose = Pose(0.6, 0.2, 0.4)
     frame = at_rest(pose)
-    low = MarkLocaliser(DEFAULT.model(), MarksConfig(height_m=0.05)).locate(frame, None, 0.06)
+    low = MarkLocaliser(camera_model(DEFAULT), MarksConfig(height_m=0.05)).locate(frame, None, 0.06)
     dx, dy, _ = errors(low.pose, pose)
     assert math.hypot(dx, dy) == pytest.approx(0.05 / 2.05 * math.hypot(0.6, 0.95), rel=0.02)
-    flat = MarkLocaliser(DEFAULT.model(), MarksConfig(height_m=0.0)).locate(frame, None, 0.06)
+    flat = MarkLocaliser(camera_model(DEFAULT), MarksConfig(height_m=0.0)).locate(frame, None, 0.06)
     assert flat.pose is None
     assert flat.reason == "marks 168 mm apart, the robot's are 160 mm"
 
@@ -175,7 +176,9 @@ def test_swapped_colours_turn_the_robot_round():
     """Negative control: marks changed over, the host not told, show theta + pi and say nothing."""
     marks = DEFAULT.marks.model_copy(update={"swapped_marks": True})
     camera = DEFAULT.model_copy(update={"marks": marks})
-    seen = MarkLocaliser(DEFAULT.model(), DEFAULT.marks).locate(at_rest(HERE, camera), None, 0.06)
+    seen = MarkLocaliser(camera_model(DEFAULT), DEFAULT.marks).locate(
+        at_rest(HERE, camera), None, 0.06
+    )
     assert abs(errors(seen.pose, HERE)[2]) == pytest.approx(math.pi, abs=0.002)
 
 

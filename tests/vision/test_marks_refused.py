@@ -8,6 +8,7 @@ import pytest
 from hil.config.camera import BarConfig, CameraConfig, ClutterConfig, MarksConfig, SceneConfig
 from hil.core.types import Pose
 from sim_twin.camera_sim import RenderedCamera
+from vision.camera_setup import camera_model
 from vision.marks import MarkLocaliser
 
 RED, GREEN = (0.07, 0.06, 0.62), (0.12, 0.42, 0.08)
@@ -18,7 +19,7 @@ def look(scene=None, pose=TRUTH, predicted=None, marks=None):
     """Return what is seen in one frame of the default camera; `marks` are those believed."""
     config = CameraConfig(scene=scene or SceneConfig())
     image = RenderedCamera(config, 1).make(0, [pose] * 2 if pose else [])
-    return MarkLocaliser(config.model(), marks or config.marks).locate(image, predicted, 0.06)
+    return MarkLocaliser(camera_model(config), marks or config.marks).locate(image, predicted, 0.06)
 
 
 @pytest.mark.parametrize("value", [0, 255, None])
@@ -30,7 +31,7 @@ def test_a_picture_of_nothing_is_not_the_robot(value):
         if value is None
         else np.full(shape, value, dtype=np.uint8)
     )
-    localiser = MarkLocaliser(CameraConfig().model(), CameraConfig().marks)
+    localiser = MarkLocaliser(camera_model(CameraConfig()), CameraConfig().marks)
     for guess in (None, Pose(0.1, 0.1, 0.1), Pose(30.0, 0.0, 0.0)):
         seen = localiser.locate(image, guess, 0.06)
         assert (seen.pose, seen.quality) == (None, 0.0)
@@ -80,7 +81,7 @@ def test_a_cable_that_rides_on_the_robot_costs_a_millimetre_and_no_pose():
         frame="body", start_m=(0.060, -0.16), end_m=(0.078, 0.16), width_m=0.008, height_m=0.12
     )
     config = CameraConfig(scene=SceneConfig(bars=(cable,)))
-    camera, localiser = RenderedCamera(config, 1), MarkLocaliser(config.model(), config.marks)
+    camera, localiser = RenderedCamera(config, 1), MarkLocaliser(camera_model(config), config.marks)
     for index in range(16):
         x, y, theta = 0.5 * math.cos(index), 0.3 * math.sin(index), 0.4 * index
         image = camera.make(index, [(x, y, theta)] * 2)

@@ -22,6 +22,7 @@ from hil.config.camera import (
 from hil.core.errors import BadInput
 from sim_twin import _native
 from sim_twin.camera_sim import RenderedCamera, _view
+from vision.camera_setup import camera_model
 
 GREY = (0.4, 0.4, 0.4)
 # No colour but that of the marks, no noise: what remains is geometry.
@@ -56,7 +57,7 @@ def centroid(weight):
 
 def projected(config, points):
     """Return pixels of world points by OpenCV."""
-    lens, model = config.lens, config.model()
+    lens, model = config.lens, camera_model(config)
     rotation = model.R_world_cam.T
     px, _ = cv2.projectPoints(
         np.asarray(points, dtype=float),
