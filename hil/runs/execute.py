@@ -26,7 +26,7 @@ from hil.runs.session import Parts, Progress, Publish, Session
 from hil.wire.identity import board_hashes
 from hil.wire.link import BoardLink
 from vision.camera_setup import camera_model
-from vision.marks import MarkLocaliser
+from vision.localisers.marks import MarkLocaliser
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario

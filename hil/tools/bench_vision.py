@@ -30,7 +30,7 @@ from hil.config.camera import (
 from hil.core.types import Pose, PoseMeasurement, wrap_pi
 from sim_twin.camera_sim import RenderedCamera
 from vision.camera_setup import camera_model
-from vision.marks import MarkLocaliser
+from vision.localisers.marks import MarkLocaliser
 from vision.tracker import Tracker
 
 View = Literal["ceiling", "oblique"]

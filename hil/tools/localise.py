@@ -22,9 +22,9 @@ from vision.calibration.files import read_camera, require_size
 from vision.camera import CameraModel
 from vision.camera_setup import camera_model
 from vision.cv_compat import dictionary_size, require_place, write_atomic
-from vision.marks import MarkLocaliser
+from vision.localisers.marks import MarkLocaliser
+from vision.localisers.tags import TagLocaliser
 from vision.sources import ImageFolder, VideoFile
-from vision.tags import TagLocaliser
 from vision.tracker import Localiser, Tracker
 
 Image = NDArray[np.uint8]

@@ -21,7 +21,7 @@ from vision.calibration.boards import parse_board
 from vision.calibration.files import Table, read_camera, update_camera
 from vision.camera_setup import camera_model
 from vision.cv_compat import read_image, write_image
-from vision.marks import MarkLocaliser
+from vision.localisers.marks import MarkLocaliser
 
 BOARD = "charuco:8x6:30:22"
 TAGS = {1: (0.15, 0.15), 2: (1.0, 0.12), 3: (1.75, 0.15), 4: (0.2, 0.7), 5: (1.7, 0.7),

@@ -11,8 +11,8 @@ from hil.core.types import Pose, PoseMeasurement, wrap_pi
 from sim_twin.camera_sim import RenderedCamera
 from vision import cv_compat
 from vision.camera_setup import camera_model
+from vision.localisers.tags import TagLocaliser
 from vision.pose_fit import fit_pose
-from vision.tags import TagLocaliser
 from vision.tracker import Tracker
 
 RADIUS_M = 0.06

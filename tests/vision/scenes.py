@@ -11,7 +11,7 @@ from hil.config.camera import CameraConfig
 from hil.core.types import Pose, wrap_pi
 from sim_twin.camera_sim import RenderedCamera
 from vision.camera_setup import camera_model
-from vision.marks import MarkLocaliser
+from vision.localisers.marks import MarkLocaliser
 
 # Two views, far apart in tilt: the default one and one at 45 degrees.
 DEFAULT = CameraConfig()

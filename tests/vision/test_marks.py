@@ -21,7 +21,7 @@ from tests.vision.scenes import (
     rms,
 )
 from vision.camera_setup import camera_model
-from vision.marks import MarkLocaliser
+from vision.localisers.marks import MarkLocaliser
 
 HERE = Pose(0.2, 0.1, 0.4)
 

@@ -9,7 +9,7 @@ from hil.config.camera import BarConfig, CameraConfig, ClutterConfig, MarksConfi
 from hil.core.types import Pose
 from sim_twin.camera_sim import RenderedCamera
 from vision.camera_setup import camera_model
-from vision.marks import MarkLocaliser
+from vision.localisers.marks import MarkLocaliser
 
 RED, GREEN = (0.07, 0.06, 0.62), (0.12, 0.42, 0.08)
 TRUTH = (0.2, 0.1, 0.5)
