@@ -79,7 +79,8 @@ def _robot(camera: CameraConfig) -> _native.Robot:
     colours = [marks.front.colour, marks.rear.colour]
     if marks.swapped_marks:
         colours.reverse()
-    patches = [] if look.tag else [_board(look)]
+    tag = camera.tag
+    patches = [] if tag else [_board(look)]
     for mark, colour in zip((marks.front, marks.rear), colours, strict=True):
         disc = _native.Patch()
         disc.disc = disc.mark = True
@@ -87,8 +88,8 @@ def _robot(camera: CameraConfig) -> _native.Robot:
         disc.colour = colour
         patches.append(disc)
     robot.patches = patches
-    if look.tag:
-        robot.tag = _tag(look.tag)
+    if tag:
+        robot.tag = _tag(tag)
     return robot
 
 

@@ -8,7 +8,7 @@ import click
 
 from hil.cli.compare import print_study
 from hil.cli.options import (
-    LAWS,
+    INNER_LAWS,
     camera_option,
     json_option,
     out_option,
@@ -23,7 +23,7 @@ from hil.cli.progress import run_progress
 @click.command("experiment")
 @click.argument("deck", default="thesis")
 @target_option
-@click.option("--inner", type=click.Choice([*LAWS.choices, "both"]), default="asg-ism",
+@click.option("--inner", type=click.Choice([*INNER_LAWS.choices, "both"]), default="asg-ism",
               show_default=True, help="Wheel law, on the board; both gives the 2 x 2 matrix.")  # fmt: skip
 @camera_option
 @click.option("--repeats", type=click.IntRange(1, 10_000), default=1, show_default=True,

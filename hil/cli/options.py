@@ -11,7 +11,7 @@ import click
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-LAWS = click.Choice(["pid", "asg-ism"])
+INNER_LAWS = click.Choice(["pid", "asg-ism"])
 
 target_option = click.option(
     "--on", "target", default="twin", show_default=True, metavar="TARGET",
@@ -23,9 +23,12 @@ camera_option = click.option(
     "twin:SOCKET (the camera of `hil twin serve`). "
     "[default: as the scenario says on a simulated target, 0 on a real one]",
 )  # fmt: skip
-outer_option = click.option("--outer", type=LAWS, default="asg-ism", show_default=True,
-                            help="Outer law, on the host.")  # fmt: skip
-inner_option = click.option("--inner", type=LAWS, default="asg-ism", show_default=True,
+outer_option = click.option(
+    "--outer", metavar="LAW",
+    help="Outer law, on the host: a name that `hil list laws` shows, FILE.py or FILE.py:NAME. "
+    "[default: as the scenario says: asg-ism]",
+)  # fmt: skip
+inner_option = click.option("--inner", type=INNER_LAWS, default="asg-ism", show_default=True,
                             help="Wheel law, on the board.")  # fmt: skip
 seed_option = click.option(
     "--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True,

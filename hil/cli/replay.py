@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hil.cli.options import LAWS, json_option, print_json, set_option
+from hil.cli.options import INNER_LAWS, json_option, print_json, set_option
 
 if TYPE_CHECKING:
     from hil.replays.exact import ReplayReport
@@ -15,8 +15,10 @@ if TYPE_CHECKING:
 
 @click.command("replay")
 @click.argument("run", type=click.Path(path_type=Path))
-@click.option("--outer", type=LAWS, help="Shadow: what this outer law would have commanded.")
-@click.option("--inner", type=LAWS, help="Shadow: PWM that this wheel law would have set.")
+@click.option("--outer", metavar="LAW", help="Shadow: what this outer law would have commanded.")
+@click.option("--recorded-code", is_flag=True,
+              help="Run the law's text that RUN holds (code from a record: look at it first).")  # fmt: skip
+@click.option("--inner", type=INNER_LAWS, help="Shadow: PWM that this wheel law would have set.")
 @click.option("--firmware", is_flag=True,
               help="Also replay set-points and encoder counts through the firmware core.")  # fmt: skip
 @click.option("--elf", is_flag=True,
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 def command(
     run: Path,
     outer: str | None,
+    recorded_code: bool,
     inner: str | None,
     firmware: bool,
     elf: bool,
@@ -63,7 +66,13 @@ def command(
     if out is not None:
         claim_folder(out)
     with run_progress({run.name: duration_s}) as update:
-        report = replay(run, outer, overrides, lambda t_s: update(run.name, t_s))
+        report = replay(
+            run,
+            outer,
+            overrides,
+            lambda t_s: update(run.name, t_s),
+            recorded_code=recorded_code,
+        )
     board_changes = [text for text in overrides if text.startswith("board.")]
     asked = firmware or elf or inner or board_changes
     wheels = replay_wheels(run, inner, board_changes, through) if asked else None

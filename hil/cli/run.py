@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 def command(
     scenario: str,
     target: str,
-    outer: str,
+    outer: str | None,
     inner: str,
     camera: str | None,
     seed: int,
@@ -63,18 +63,21 @@ def command(
     Built in: scenario-1, scenario-2, scenario-3 (the three experiments) and circle (section 8.9).
     """
     from hil.config.load import load_scenario
+    from hil.core.registries import OUTER_LAWS
     from hil.record.manifest import command_line
     from hil.runs.execute import RunSpec, camera_for, execute, exit_status, new_folder
 
+    law = OUTER_LAWS.get(outer) if outer else None
     resolved = load_scenario(scenario, overrides)
+    law = law or OUTER_LAWS.get(resolved.control.outer)
     spec = RunSpec(
         scenario=resolved,
         target=target,
         camera=camera_for(resolved, target, camera),
-        outer=outer,
+        outer=law.name,
         inner=inner,
         seed=seed,
-        out=out or new_folder(f"{resolved.name}-{outer}"),
+        out=out or new_folder(f"{resolved.name}-{law.name}"),
         record_camera=record_camera,
         command=command_line(),
     )

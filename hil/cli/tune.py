@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from hil.analysis.metrics import Metric
     from hil.analysis.stats import Paired
     from hil.cli.progress import Stage
-    from hil.config.control import Gains
+    from hil.config.gains import Gains
     from hil.study.tune import Figures, Trial
     from hil.study.tuning_verdict import Verdict
 

@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 import difflib
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    ModelWrapValidatorHandler,
+    model_validator,
+)  # fmt: skip
+
+from hil.core.errors import BadInput
+from hil.core.registry import Registry
 
 
 class Section(BaseModel):
@@ -23,3 +33,36 @@ class Section(BaseModel):
                     near = difflib.get_close_matches(str(key), known, n=3, cutoff=0.5)
                     raise ValueError(f"unknown key {key!r}; near: {', '.join(near or known)}")
         return tree
+
+
+class OpenSection(Section):
+    """A table whose model depends on what is registered: laws' gains, a reference of some kind."""
+
+    @classmethod
+    def model_for(cls, tree: Any) -> type[BaseModel]:
+        """Return the model of a table as it stands; raises BadInput for an unknown kind."""
+        raise NotImplementedError
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _by_its_model(cls, given: Any, handler: ModelWrapValidatorHandler[Self]) -> Any:
+        if OpenSection in cls.__bases__ and isinstance(given, Mapping):
+            try:
+                model = cls.model_for(given)
+            except BadInput as error:
+                raise ValueError(str(error)) from None
+            return model.model_validate(given)
+        return handler(given)
+
+
+def known_name(registry: Registry) -> AfterValidator:
+    """Return the check that a name, or a file, is one that a registry has."""
+
+    def check(name: str) -> str:
+        try:
+            registry.get(name)
+        except BadInput as error:
+            raise ValueError(str(error)) from None
+        return name
+
+    return AfterValidator(check)

@@ -11,7 +11,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from hil.config.base import Section
+from hil.config.base import Section, known_name
+from hil.core.registries import LOCALISERS
 
 Reflectance = Annotated[float, Field(ge=0.0, le=1.0)]
 Colour = tuple[Reflectance, Reflectance, Reflectance]
@@ -256,8 +257,17 @@ class CameraConfig(Section):
     search_radius_m: float = Field(
         0.06, gt=0.0, le=2.0, description="m, window around the prediction: 0.5 m/s over 4 frames"
     )
+    localiser: Annotated[str, known_name(LOCALISERS)] = Field(
+        "marks", description="what finds the robot: marks, tags, or a file"
+    )
     lens: LensConfig = LensConfig()
     pose: CameraPoseConfig = CameraPoseConfig()
     marks: MarksConfig = MarksConfig()
     robot_look: RobotLookConfig = RobotLookConfig()
     scene: SceneConfig = SceneConfig()
+
+    @property
+    def tag(self) -> TagConfig | None:
+        """Return the tag on the robot: the one described, or the default where tags are looked for."""
+        tag = self.robot_look.tag
+        return TagConfig() if tag is None and self.localiser == "tags" else tag

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import tomllib
-from importlib.resources import files
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BaseModel, Field
 
-from hil.config.base import Section
+from hil.config.base import OpenSection, Section, known_name
+from hil.config.gains import Gains, GainSets
+from hil.core.registries import ESTIMATORS, OUTER_LAWS, REFERENCES
 
-OuterLawName = Literal["asg-ism", "pid"]
 GainSetName = Literal["tuned", "thesis"]
-EstimatorName = Literal["fused", "camera-only"]
+
+
+OuterLawName = Annotated[str, known_name(OUTER_LAWS)]
+EstimatorName = Annotated[str, known_name(ESTIMATORS)]
 
 
 class OuterLimits(Section):
@@ -58,77 +60,6 @@ class OuterLimits(Section):
     hold_leave_m: float = Field(
         0.006, gt=0, le=1, description="m, pushed away: start anew beyond; well above hold_enter_m"
     )
-
-
-class AsgIsmGains(Section):
-    """Gains of backstepping with ASG-ISM (8.6)-(8.22), control.md section 2."""
-
-    k1_s: float = Field(gt=0, le=100, description="1/s at p = 1, position error to speed")
-    k2_s: float = Field(gt=0, le=100, description="1/s at p = 1, speed error to acceleration")
-    p: float = Field(1.0, ge=1, le=3, description="exponent 1 + epsilon of (8.6), (8.11)")
-    alpha_m_s3: float = Field(ge=0, le=1e4, description="m/s^3, gain of the sliding term")
-    eps0_m_s2: float = Field(0.0, ge=0, le=100, description="m/s^2, layer eps0/(t+mu0)^(1+beta)")
-    beta: float = Field(0.5, gt=0, lt=1, description="rate at which the layer shrinks, (4.20)")
-    eps_min_m_s2: float = Field(gt=0, le=100, description="m/s^2, floor of the layer")
-    mu0_s: float = Field(gt=0, le=100, description="s, mu = 1/(t + mu0)")
-    sigma_m_s2: float = Field(ge=0, le=100, description="m/s^2, scale of the cost H in Psi")
-
-
-class PidGains(Section):
-    """Gains of the state feedback in PID form on the linearised chain (control.md section 2)."""
-
-    kp_s3: float = Field(gt=0, le=1e6, description="1/s^3, on delta1")
-    ki_s4: float = Field(0.0, ge=0, le=1e6, description="1/s^4, on the integral of delta1")
-    kd1_s2: float = Field(gt=0, le=1e6, description="1/s^2, on d delta1/dt")
-    kd2_s: float = Field(gt=0, le=1e4, description="1/s, on d2 delta1/dt2")
-
-
-class Gains(Section):
-    """The gains of both laws, as one named set; `origin` says where they come from."""
-
-    asg_ism: AsgIsmGains = Field(description="gains of asg-ism")
-    pid: PidGains = Field(description="gains of pid")
-    origin: dict[str, str | int | float] = Field(
-        default_factory=dict, description="procedure, budget, seed, cost, revision; or the source"
-    )
-
-
-class GainSets(Section):
-    """The named sets of hil/data/gains; values given in a scenario are laid over those files."""
-
-    tuned: Gains = Field(description="found by `hil.study.tune`, the same budget for both laws")
-    thesis: Gains = Field(description="table 8.2 as read in docs/control.md")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _over_files(cls, given: object) -> object:
-        if not isinstance(given, dict):
-            return given
-        known = {name: read_gain_set(name) for name in cls.model_fields}
-        return _laid_over(known, given)
-
-    @classmethod
-    def from_files(cls) -> GainSets:
-        """Return the sets as they ship."""
-        return cls.model_validate({})
-
-
-def read_gain_set(name: str) -> dict[str, Any]:
-    """Return the tables of a gain file that ships with the package."""
-    text = (files("hil") / "data" / "gains" / f"{name}.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)
-
-
-def _laid_over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
-    """Return `below` with the keys of `above` over it, table by table."""
-    result = dict(below)
-    for key, value in above.items():
-        old = result.get(key)
-        if isinstance(old, dict) and isinstance(value, dict):
-            result[key] = _laid_over(old, value)
-        else:
-            result[key] = value
-    return result
 
 
 class EstimatorConfig(Section):
@@ -184,7 +115,18 @@ class EstimatorConfig(Section):
     )
 
 
-class PointReference(Section):
+class ReferenceConfig(OpenSection):
+    """What a reference of some kind is made of; each kind's own model lies on this one."""
+
+    kind: str = Field(description="kind of reference: a registered name or a file")
+
+    @classmethod
+    def model_for(cls, tree: Any) -> type[BaseModel]:
+        """Return the model of the kind that a table names; raises BadInput for an unknown one."""
+        return REFERENCES.get(str(tree.get("kind", ""))).settings or cls
+
+
+class PointReference(ReferenceConfig):
     """A desired point on the floor for the flat output, reached and held."""
 
     kind: Literal["point"] = "point"
@@ -192,7 +134,7 @@ class PointReference(Section):
     y_m: float = Field(0.0, ge=-100, le=100, description="m, world Y of z1*")
 
 
-class CircleReference(Section):
+class CircleReference(ReferenceConfig):
     """The circle (8.23): the centre of mass runs clockwise from (0, radius), z1* leads it by d0."""
 
     kind: Literal["circle"] = "circle"
@@ -203,7 +145,7 @@ class CircleReference(Section):
     center_y_m: float = Field(0.0, ge=-100, le=100, description="m, world Y of the centre")
 
 
-class WaypointReference(Section):
+class WaypointReference(ReferenceConfig):
     """A smooth path through waypoints from rest to rest, three times differentiable in time."""
 
     kind: Literal["waypoints"] = "waypoints"
@@ -214,11 +156,6 @@ class WaypointReference(Section):
     turn_rate_max_rad_s: float = Field(
         1.5, gt=0, le=20, description="rad/s, bound on the turn rate that the path asks for"
     )
-
-
-ReferenceConfig = Annotated[
-    PointReference | CircleReference | WaypointReference, Field(discriminator="kind")
-]
 
 
 class ControlConfig(Section):

@@ -15,9 +15,11 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from hil.board._firmware import parameter_table
+from hil.config.gains import shipped_gains
 from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
+from hil.core.registry import is_file_name
 
 Tree = dict[str, Any]
 Model = TypeVar("Model", bound=BaseModel)
@@ -56,11 +58,19 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
     """
     tree = read_tree(name_or_path, "scenarios")
     tree["board"] = board_defaults() | tree.get("board", {})
+    _lay_over_shipped_gains(tree)
     scenario = build(Scenario, tree, name_or_path)
     if overrides:
         return with_overrides(scenario, overrides)
     check_board(scenario.board)
     return scenario
+
+
+def _lay_over_shipped_gains(tree: Tree) -> None:
+    """Put the gains that ship below those that a scenario's file gives, in place."""
+    control = tree.setdefault("control", {})
+    if isinstance(control, dict) and isinstance(control.get("gains", {}), dict):
+        control["gains"] = merge(shipped_gains(), control.get("gains", {}))
 
 
 def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
@@ -107,10 +117,25 @@ def read_tree(name_or_path: str, kind: str) -> Tree:
             own = dict(tree[part])
             below = read_tree(_beside(folder, str(own.pop("file"))), f"{part}s")
             tree[part] = merge(below, own)
+    _set_files_beside(tree, folder)
     base = tree.pop("base", None)
     if base is not None:
         tree = merge(read_tree(_beside(folder, str(base)), _base_kind(str(base), kind)), tree)
     return tree
+
+
+# Values that name a registered thing, or a file that defines one.
+_PLUGIN_KEYS = (
+    ("control", "outer"), ("control", "estimator"), ("camera", "localiser"), ("reference", "kind"),
+)  # fmt: skip
+
+
+def _set_files_beside(tree: Tree, folder: Path | None) -> None:
+    """Make the path of a law's file and the like, named relative to the scenario's, whole; in place."""
+    for table, key in _PLUGIN_KEYS:
+        node = tree.get(table)
+        if folder is not None and isinstance(node, dict) and is_file_name(str(node.get(key, ""))):
+            node[key] = str(folder.resolve() / node[key])
 
 
 def _base_kind(base: str, kind: str) -> str:

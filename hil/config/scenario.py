@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, SerializeAsAny
 
 from hil.config.base import Section
 from hil.config.camera import CameraConfig
@@ -48,7 +48,7 @@ class Scenario(Section):
     description: str = ""
     duration_s: float = Field(gt=0, le=3600, description="length of the controlled part")
     start: StartPose
-    reference: ReferenceConfig
+    reference: SerializeAsAny[ReferenceConfig]
     requirements: tuple[Requirement, ...] = ()
     robot: RobotConfig
     mismatch: dict[str, float] = Field(

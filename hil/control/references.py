@@ -10,6 +10,7 @@ import numpy as np
 
 from hil.config.control import CircleReference, PointReference, ReferenceConfig, WaypointReference
 from hil.core.errors import BadInput
+from hil.core.registries import REFERENCES
 from hil.core.types import ReferenceState
 
 if TYPE_CHECKING:
@@ -25,6 +26,9 @@ class Reference(Protocol):
         """Return the desired state `t_s` after the start of the run (negative: as at 0)."""
 
 
+@REFERENCES.register(
+    "point", settings=PointReference, summary="a point on the floor, reached and held"
+)
 class Point:
     """A fixed point."""
 
@@ -36,6 +40,7 @@ class Point:
         return self._state
 
 
+@REFERENCES.register("circle", settings=CircleReference, summary="the circle (8.23)")
 class Circle:
     """The circle (8.23), clockwise from (0, radius) about the centre.
 
@@ -63,6 +68,11 @@ class Circle:
         )
 
 
+@REFERENCES.register(
+    "waypoints",
+    settings=WaypointReference,
+    summary="a smooth path through points, from rest to rest",
+)
 class Waypoints:
     """A quintic spline through the waypoints, run from rest to rest.
 
@@ -161,9 +171,6 @@ def _chain_rule(
 
 
 def make_reference(config: ReferenceConfig) -> Reference:
-    """Return the reference a scenario asks for."""
-    if isinstance(config, PointReference):
-        return Point(config)
-    if isinstance(config, CircleReference):
-        return Circle(config)
-    return Waypoints(config)
+    """Return the reference a scenario asks for; raises BadInput where there is none such."""
+    made: Reference = REFERENCES.get(config.kind).factory(config)
+    return made

@@ -203,6 +203,7 @@ class Registry:
         known = self._files.get((source.path, source.sha256))
         if known is None:
             known = self._files[(source.path, source.sha256)] = self._run(source)
+        self._entries |= {entry.name: entry for entry in known}
         return self._choose(source, known, wanted)
 
     def _run(self, source: SourceText) -> tuple[Entry, ...]:

@@ -12,3 +12,4 @@ CAMERA = "camera.mkv"
 RERUN = "run.rrd"
 FIGURES = "metrics.json"
 PICTURES = "pictures"
+PLUGINS = "plugins"  # texts of laws, estimators, ... that came from files

@@ -32,7 +32,7 @@ from pydantic import Field, ValidationError
 
 from hil.config.base import Section
 from hil.config.load import load_scenario
-from hil.control.estimators import BelievedGeometry
+from hil.control.estimators.geometry import BelievedGeometry
 from hil.control.references import make_reference
 from hil.core.errors import BadInput
 from hil.record.manifest import Manifest, collect_versions, git_revision

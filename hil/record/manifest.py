@@ -14,9 +14,10 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError
 
 from hil.core.errors import BadInput
+from hil.core.registry import Entry
 from hil.record import layout
 from hil.record.schema import SCHEMA_VERSION
 
@@ -31,6 +32,36 @@ class FileEntry(BaseModel):
 
     bytes: int
     sha256: str
+
+
+class Plugin(BaseModel):
+    """A thing from outside the harness that took part in a run: a file's text is kept in the record."""
+
+    model_config = ConfigDict(frozen=True)
+
+    kind: str
+    name: str
+    origin: str = Field(description="the package, or the file's path when it ran")
+    sha256: str = Field("", description="of the file's text; empty for a package")
+    file: str = Field("", description="the text, inside the record's folder")
+    _text: str = PrivateAttr("")
+
+    @classmethod
+    def of(cls, kind: str, entry: Entry) -> Plugin:
+        """Return what the record says of a registry's entry."""
+        if entry.source is None:
+            return cls(kind=kind, name=entry.name, origin=entry.origin)
+        file = f"{layout.PLUGINS}/{kind.replace(' ', '_')}-{entry.source.path.name}"
+        plugin = cls(
+            kind=kind, name=entry.name, origin=entry.origin, sha256=entry.source.sha256, file=file
+        )
+        plugin._text = entry.source.text
+        return plugin
+
+    @property
+    def text(self) -> str:
+        """Return the text that ran; empty for a package, and for a plug-in read from a manifest."""
+        return self._text
 
 
 class Manifest(BaseModel):
@@ -52,6 +83,7 @@ class Manifest(BaseModel):
     outer: str
     inner: str
     gains: dict[str, Any] = Field(default_factory=dict, description="gains of the laws in use")
+    plugins: list[Plugin] = Field(default_factory=list, description="what ran from outside")
     versions: dict[str, str] = Field(default_factory=dict)
     git_revision: str = ""
     dialect_hash: str = ""

@@ -14,7 +14,7 @@ from hil.core.errors import BadInput
 from hil.record import layout
 from hil.record.camera import CameraKeeper
 from hil.record.journal import Columns, Journal, read_journal, write_parquet
-from hil.record.manifest import Manifest, Outcome, file_entry, replace_file, write_manifest
+from hil.record.manifest import Manifest, Outcome, Plugin, file_entry, replace_file, write_manifest
 from hil.record.reader import RunRecord, read_events, read_pictures
 from hil.record.schema import FRAME_COLUMNS, FRAME_NAMES, SAMPLE_COLUMNS, SAMPLE_NAMES, Column
 from hil.record.tape import TapeWriter
@@ -44,11 +44,13 @@ class Recorder:
         record_camera: bool = False,
         frame_rate_hz: float = 30.0,
         rerun: bool = True,
+        plugins: Sequence[Plugin] = (),
     ) -> None:
         self.path = out_dir
         self._manifest = manifest
         self._rerun = rerun
         self._claim(out_dir)
+        self._keep(plugins)
         self._samples = Journal(out_dir / layout.SAMPLES_JOURNAL, SAMPLE_NAMES)
         self._frames = Journal(out_dir / layout.FRAMES_JOURNAL, FRAME_NAMES)
         self._tlog = TlogWriter(out_dir / layout.LINK, manifest.start_unix_us)
@@ -71,6 +73,14 @@ class Recorder:
                 raise BadInput(f"--out {out_dir}: the folder is not empty; name a new one")
         except OSError as error:
             raise BadInput(f"--out {out_dir}: cannot be made: {error.strerror}") from None
+
+    def _keep(self, plugins: Sequence[Plugin]) -> None:
+        """Write the text of every file that takes part."""
+        for plugin in plugins:
+            if plugin.file:
+                path = self.path / plugin.file
+                path.parent.mkdir(exist_ok=True)
+                path.write_text(plugin.text, encoding="utf-8")
 
     def start(self, unix_us: int) -> None:
         """Take the wall time of t_s = 0, which dates every frame of link.tlog."""

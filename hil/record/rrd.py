@@ -18,6 +18,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from hil.analysis import metrics
+from hil.core.registries import OUTER_LAWS
 from hil.record.reader import RunRecord
 
 if TYPE_CHECKING:
@@ -32,7 +33,6 @@ TIMELINE = "t"
 APPLICATION = "skid-steer-hil"
 _BODY_M = (0.15, 0.2166, 0.06)  # thesis Table 8.3: length, width; height is for the eye only
 # Colours that people with a colour deficiency tell apart (Okabe and Ito), as in the HTML report.
-_RUN_COLOURS = {"pid": (0, 114, 178), "asg-ism": (213, 94, 0)}
 _OTHER_COLOURS = ((0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233))
 _LINE_COLOURS = ((230, 230, 230), (86, 180, 233), (230, 159, 0), (0, 158, 115))
 _GREY = (140, 140, 140)
@@ -115,8 +115,9 @@ def _recording_id(runs: Sequence[RunRecord]) -> str:
 def _colour(run: RunRecord, index: int, runs: Sequence[RunRecord]) -> Colour:
     """Return the colour of the law, or a distinct one when two runs have the same law."""
     laws = [other.manifest.outer for other in runs]
-    if laws.count(run.manifest.outer) == 1 and run.manifest.outer in _RUN_COLOURS:
-        return _RUN_COLOURS[run.manifest.outer]
+    own = {entry.name: entry.colour for entry in OUTER_LAWS.entries()}.get(run.manifest.outer)
+    if own and laws.count(run.manifest.outer) == 1:
+        return int(own[1:3], 16), int(own[3:5], 16), int(own[5:7], 16)
     return _OTHER_COLOURS[index % len(_OTHER_COLOURS)]
 
 

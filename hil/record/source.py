@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hil.config.gains import gains_model
+from hil.config.load import build
+from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
+from hil.core.registries import BY_KIND
+from hil.core.registry import SourceText
 from hil.record import layout
 from hil.record.manifest import Manifest, read_manifest
 from hil.record.reader import altered_files, read_table
@@ -61,3 +67,45 @@ def read_source(path: Path) -> Source:
     samples, frames = tables
     link = tuple(read_tlog(path / layout.LINK)) if (path / layout.LINK).is_file() else ()
     return Source(path, manifest, tape, samples, frames, link, tuple(problems))
+
+
+def recorded_scenario(manifest: Manifest, where: Path) -> Scenario:
+    """Return the scenario of a record; raises BadInput.
+
+    Gains of laws that are not known here (they were files) are left out: only a replay needs them,
+    and it has them loaded first.
+    """
+    tree = copy.deepcopy(manifest.scenario)
+    known = gains_model().model_fields
+    for table in tree.get("control", {}).get("gains", {}).values():
+        for key in [key for key in table if key not in known]:
+            del table[key]
+    return build(Scenario, tree, str(where / layout.MANIFEST))
+
+
+def load_plugins(source: Source, *, recorded_code: bool = False) -> None:
+    """Make the laws and other things from files known again, as they were when the record was made.
+
+    The file must still stand where it was with the same text; with `recorded_code` the text in the
+    record is run instead. Raises BadInput.
+    """
+    for plugin in source.manifest.plugins:
+        registry = BY_KIND.get(plugin.kind)
+        if registry is None or not plugin.file:
+            continue
+        kept = source.path / plugin.file
+        if recorded_code:
+            text = kept.read_text(encoding="utf-8")
+            if SourceText(kept, text).sha256 != plugin.sha256:
+                raise BadInput(f"{kept}: is not the text that ran (SHA-256 differs); not run")
+            registry.load_text(SourceText(Path(plugin.origin), text), plugin.name)
+            continue
+        path = Path(plugin.origin)
+        now = path.read_text(encoding="utf-8") if path.is_file() else None
+        if now is None or SourceText(path, now).sha256 != plugin.sha256:
+            what = "is gone" if now is None else "has changed since"
+            raise BadInput(
+                f"{plugin.kind} {plugin.name}: {path} {what}; the text that ran is {kept}: to run "
+                "that one, --recorded-code"
+            )
+        registry.load_text(SourceText(path, now), plugin.name)

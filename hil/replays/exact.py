@@ -13,14 +13,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from hil.config.load import build, with_overrides
+from hil.config.load import with_overrides
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput, RigFault
+from hil.core.registries import OUTER_LAWS
 from hil.core.types import Estimate, OuterCommand, OuterLaw, ReferenceState
 from hil.record import layout
 from hil.record.memory import MemoryRecorder
 from hil.record.schema import FRAME_NAMES, SAMPLE_NAMES
-from hil.record.source import Source, read_source
+from hil.record.source import Source, load_plugins, read_source, recorded_scenario
 from hil.record.tlog import LoggedFrame
 from hil.replays.divergence import Channel, compare_columns, compare_link
 from hil.rigs.replay import open_replay
@@ -98,15 +99,20 @@ def replay(
     outer: str | None = None,
     overrides: Sequence[str] = (),
     progress: Callable[[float], None] | None = None,
+    *,
+    recorded_code: bool = False,
 ) -> ReplayReport:
     """Replay a record; with another law or changed values, as a shadow of it.
 
-    Raises BadInput when the folder is no record, has nothing to replay, or a change makes no sense.
+    A law that came from a file is run as its file stands, which must be as it was; with
+    `recorded_code` the text kept in the record is run. Raises BadInput when the folder is no record,
+    has nothing to replay, a file has changed, or a change makes no sense.
     """
     source = read_source(path)
-    recorded = build(Scenario, source.manifest.scenario, str(path / layout.MANIFEST))
+    load_plugins(source, recorded_code=recorded_code)
+    recorded = recorded_scenario(source.manifest, path)
     scenario = _changed(recorded, overrides)
-    law = outer or source.manifest.outer
+    law = OUTER_LAWS.get(outer).name if outer else source.manifest.outer
     kind: Kind = "shadow" if overrides or law != source.manifest.outer else "exact"
     spec = RunSpec(
         scenario, source.manifest.target, source.manifest.camera, law, source.manifest.inner,

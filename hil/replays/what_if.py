@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 from hil.analysis.metrics import BY_NAME, compute
 from hil.analysis.stats import Paired, paired
-from hil.config.load import build, with_overrides
+from hil.config.load import with_overrides
 from hil.config.scenario import Scenario, StartPose
-from hil.record import layout
-from hil.record.source import read_source
+from hil.record.source import load_plugins, read_source, recorded_scenario
 from hil.replays.fit import UNITS, Fit, Rehearsal, fit_twin
 from hil.report.compare import HEADLINES
 from hil.report.repeats import verdict
@@ -99,7 +98,8 @@ def what_if(
     """
     source = read_source(path)
     manifest = source.manifest
-    recorded = build(Scenario, manifest.scenario, str(path / layout.MANIFEST))
+    load_plugins(source)
+    recorded = recorded_scenario(manifest, path)
     rehearsal = Rehearsal(source, recorded)
     fit = fit or fit_twin(rehearsal)
     x_m, y_m, theta_rad = rehearsal.start_pose()

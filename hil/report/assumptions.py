@@ -18,9 +18,10 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
 from hil.board._firmware import Parameter, parameter_table
-from hil.config.control import Gains
+from hil.config.base import OpenSection
 from hil.config.load import UNITS, unit_of
 from hil.config.scenario import Scenario
+from hil.core.registries import OUTER_LAWS
 
 _LINE = re.compile(r'^"?(?P<key>[\w.]+)"?\s*=\s*(?P<value>[^#]*?)\s*(?:#\s*(?P<note>.*))?$')
 _TABLE = re.compile(r"^\[(?P<table>[\w.]+)\]")
@@ -61,8 +62,9 @@ def assumptions(scenario: Mapping[str, Any]) -> list[tuple[str, list[Assumption]
 
 def gain_assumptions(outer: str, values: Mapping[str, Any], source: str) -> list[Assumption]:
     """Return the gains of one outer law as a manifest has them."""
-    model = Gains.model_fields[outer.replace("-", "_")].annotation
-    fields = model.model_fields if isinstance(model, type) and issubclass(model, BaseModel) else {}
+    laws = {entry.name: entry for entry in OUTER_LAWS.entries()}
+    settings = laws[outer].settings if outer in laws else None
+    fields = settings.model_fields if settings is not None else {}
     return [
         Assumption(
             key,
@@ -127,6 +129,8 @@ def _meaning(key: str, scenario: Mapping[str, Any]) -> str:
         node = node[part]
         sections = _sections_in(field.annotation)
         model = next((one for one in sections if _is_kind(one, node)), None)
+        if model is not None and issubclass(model, OpenSection):
+            model = model.model_for(node)
     return ""
 
 

@@ -18,6 +18,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from hil.analysis import metrics
+from hil.core.registries import OUTER_LAWS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +36,6 @@ RUNS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 _VARIABLES = {INK: "var(--ink)", _FAINT: "var(--grid)"} | {
     colour: f"var(--run-{number})" for number, colour in enumerate(RUNS)
 }
-_LAW_COLOURS = {"pid": 0, "asg-ism": 1}
 _WIDTH_IN = 7.4
 _NEAR_MM = 40.0
 _MAX_POINTS = 600  # a wider line has more points than a screen has dots
@@ -88,15 +88,31 @@ def traces(entries: Sequence[Entry]) -> list[Trace]:
     Runs of one law then share colour and label, so that a legend has one line for all of them.
     """
     laws = [entry.run.manifest.outer for entry in entries]
-    by_law = len(set(laws)) > 1 and set(laws) <= set(_LAW_COLOURS)
+    colours = law_colours(laws)
+    by_law = len(colours) > 1
     return [
         Trace(
             entry.label if laws.count(law) == 1 or not by_law else law,
-            _LAW_COLOURS[law] if by_law else index % len(RUNS),
+            colours[law] if by_law else index % len(RUNS),
             entry.run.samples,
         )
         for index, (entry, law) in enumerate(zip(entries, laws, strict=True))
     ]
+
+
+def law_colours(laws: Sequence[str]) -> dict[str, int]:
+    """Return a place in RUNS for each law: its own colour's where it has one, else the next free."""
+    names = list(dict.fromkeys(laws))
+    own = {entry.name: entry.colour.lower() for entry in OUTER_LAWS.entries()}
+    taken: dict[str, int] = {}
+    for name in names:
+        if own.get(name) in RUNS and RUNS.index(own[name]) not in taken.values():
+            taken[name] = RUNS.index(own[name])
+    free = (place for place in range(len(RUNS)) if place not in taken.values())
+    for name in names:
+        if name not in taken:
+            taken[name] = next(free, len(taken) % len(RUNS))
+    return taken
 
 
 class Sheet:

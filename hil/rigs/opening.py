@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hil.config.load import build
 from hil.config.mismatch import true_robot
 from hil.core.errors import BadInput
 
@@ -34,12 +33,11 @@ def open_rig(target: str, scenario: Scenario, camera: str, seed: int) -> Rig:
         device, baud = parse_target(target)
         return SerialRig(device, baud, open_source(camera, scenario.camera))
     if target.startswith("replay:"):
-        from hil.config.scenario import Scenario as Recorded  # noqa: PLC0415
-        from hil.record.source import read_source  # noqa: PLC0415
+        from hil.record.source import read_source, recorded_scenario  # noqa: PLC0415
         from hil.rigs.replay import open_replay  # noqa: PLC0415
 
         source = read_source(Path(target.removeprefix("replay:")))
-        return open_replay(source, build(Recorded, source.manifest.scenario, str(source.path)))
+        return open_replay(source, recorded_scenario(source.manifest, source.path))
     raise BadInput(f"target {target!r}: unknown; choose twin, pil, serial:DEV[@BAUD] or replay:RUN")
 
 

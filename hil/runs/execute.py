@@ -11,26 +11,30 @@ from typing import TYPE_CHECKING
 import cv2
 
 from hil.analysis.metrics import LinkStats
-from hil.control.estimators import BelievedGeometry, make_estimator
-from hil.control.laws import make_outer_law
+from hil.control.estimators.geometry import BelievedGeometry
+from hil.control.estimators.making import make_estimator
+from hil.control.laws.hold import HoldAtGoal
+from hil.control.laws.making import make_outer_law
 from hil.control.references import make_reference
 from hil.core.clocks import CameraClock
-from hil.record.manifest import Manifest, collect_versions, git_revision
+from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES
+from hil.core.registry import BUILT_IN
+from hil.record.manifest import Manifest, Plugin, collect_versions, git_revision
 from hil.record.memory import MemoryRecorder
 from hil.record.recorder import Recorder
 from hil.record.tape import TapedRig
 from hil.record.timeline import Timeline
 from hil.rigs.opening import SIMULATED, open_rig
 from hil.runs.interruption import CtrlC
+from hil.runs.law_guard import GuardedLaw
 from hil.runs.session import Parts, Progress, Publish, Session
 from hil.wire.identity import board_hashes
 from hil.wire.link import BoardLink
-from vision.camera_setup import camera_model
-from vision.localisers.marks import MarkLocaliser
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
     from hil.core.rig import Rig
+    from hil.core.types import OuterLaw
     from hil.record.memory import RunSink
     from hil.record.reader import RunRecord
 
@@ -93,17 +97,19 @@ def execute(
     """
     cv2.setNumThreads(1)  # search windows are small: handing them to threads costs more
     parameters = board_parameters(spec.scenario, spec.inner)
+    law = make_law(spec)
     rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
     try:
         recorder = Recorder(
             spec.out,
             make_manifest(spec),
+            plugins=plugins_of(spec),
             record_camera=spec.record_camera,
             frame_rate_hz=spec.scenario.camera.rate_hz,
             rerun=spec.rerun,
         )
         ctrl_c = CtrlC()
-        parts = make_parts(spec, TapedRig(rig, recorder.tape, ctrl_c.obey), recorder)
+        parts = make_parts(spec, TapedRig(rig, recorder.tape, ctrl_c.obey), recorder, law)
         session = Session(spec.scenario, parts, parameters, board_hashes, progress, publish)
         with ctrl_c:
             ending = session.run()
@@ -120,10 +126,11 @@ def execute_in_memory(spec: RunSpec, rig: Rig | None = None) -> RunRecord:
     `rig` is another one than the spec's target names; it is closed here.
     """
     parameters = board_parameters(spec.scenario, spec.inner)
+    law = make_law(spec)
     rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
     try:
         recorder = MemoryRecorder(make_manifest(spec))
-        parts = make_parts(spec, rig, recorder)
+        parts = make_parts(spec, rig, recorder, law)
         ending = Session(spec.scenario, parts, parameters, board_hashes).run()
         return recorder.close(ending.outcome, ending.detail, link_stats(parts.link))
     finally:
@@ -138,8 +145,35 @@ def board_parameters(scenario: Scenario, inner: str) -> dict[str, float]:
     }
 
 
-def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink) -> Parts:
-    """Return the parts of a session over `rig`."""
+def make_law(spec: RunSpec) -> OuterLaw:
+    """Return the outer law of a run, guarded where it comes from outside.
+
+    Raises BadInput for an unknown one, RigFault for one that fails while it is made.
+    """
+    control, d0_m = spec.scenario.control, spec.scenario.robot.d0_m
+    entry = OUTER_LAWS.get(spec.outer)
+    if entry.origin == BUILT_IN:
+        return make_outer_law(spec.outer, control.active_gains, control.limits, d0_m)
+    gains, limits = control.active_gains.of(entry), control.limits
+    law = GuardedLaw(entry, lambda: entry.factory(gains, limits, d0_m), limits)
+    return HoldAtGoal(law, limits) if entry.extra.get("hold", True) else law
+
+
+def plugins_of(spec: RunSpec) -> list[Plugin]:
+    """Return what ran that is not part of the harness, for the record."""
+    control = spec.scenario.control
+    used = (
+        (OUTER_LAWS, spec.outer),
+        (ESTIMATORS, control.estimator),
+        (LOCALISERS, spec.scenario.camera.localiser),
+        (REFERENCES, spec.scenario.reference.kind),
+    )
+    entries = [(registry.kind, registry.get(name)) for registry, name in used]
+    return [Plugin.of(kind, entry) for kind, entry in entries if entry.origin != BUILT_IN]
+
+
+def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None = None) -> Parts:
+    """Return the parts of a session over `rig`; `law` is another one than a new one of the spec."""
     scenario, control = spec.scenario, spec.scenario.control
     robot = scenario.robot
     geometry = BelievedGeometry(
@@ -150,9 +184,9 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink) -> Parts:
         rig=rig,
         link=BoardLink(rig.stream, timeline.link_frame),
         camera_clock=CameraClock(scenario.camera.latency_s),
-        localiser=MarkLocaliser(camera_model(scenario.camera), scenario.camera.marks),
+        localiser=LOCALISERS.get(scenario.camera.localiser).factory(scenario.camera),
         estimator=make_estimator(control.estimator, control.fusion, geometry),
-        law=make_outer_law(spec.outer, control.active_gains, control.limits, robot.d0_m),
+        law=law or make_law(spec),
         reference=make_reference(scenario.reference),
         geometry=geometry,
         recorder=recorder,
@@ -162,7 +196,8 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink) -> Parts:
 
 def make_manifest(spec: RunSpec) -> Manifest:
     """Return the manifest a record opens with."""
-    gains = spec.scenario.control.active_gains.model_dump(mode="json")
+    law = OUTER_LAWS.get(spec.outer)
+    gains = spec.scenario.control.active_gains.of(law)
     now_us = _unix_us()
     return Manifest(
         command=spec.command,
@@ -170,13 +205,14 @@ def make_manifest(spec: RunSpec) -> Manifest:
         seed=spec.seed,
         target=spec.target,
         camera=spec.camera,
-        outer=spec.outer,
+        outer=law.name,
         inner=spec.inner,
         gains={
-            "outer": gains[spec.outer.replace("-", "_")],
+            "outer": gains.model_dump(mode="json") if gains is not None else {},
             "set": spec.scenario.control.gain_set,
             "board": board_parameters(spec.scenario, spec.inner),
         },
+        plugins=plugins_of(spec),
         versions=collect_versions(),
         git_revision=git_revision(),
         start_time_utc=datetime.fromtimestamp(now_us * 1e-6, UTC).isoformat(timespec="seconds"),

@@ -267,7 +267,7 @@ def circle_study() -> CircleStudy:
     xi = ideal_circle.Disturbances()
     return CircleStudy.of(
         {law: ideal_circle.run_circle(law, xi) for law in ("pid", "asg-ism")},
-        ideal_circle.CIRCLE_GAINS.asg_ism.eps_min_m_s2,
+        ideal_circle.CIRCLE_LAYER_M_S2,
         f"{xi.a1_m_s2:g} sin({xi.w1_rad_s:g} t) m/s² on the forward acceleration, "
         f"{xi.a2_m_s2:g} sin({xi.w2_rad_s:g} t) m/s² on the lateral acceleration",
     )

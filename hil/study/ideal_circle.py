@@ -11,8 +11,9 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from hil.config.control import AsgIsmGains, CircleReference, Gains, OuterLimits, PidGains
-from hil.control.laws import make_outer_law
+from hil.config.control import CircleReference, OuterLimits
+from hil.config.gains import make_gains
+from hil.control.laws.making import make_outer_law
 from hil.control.references import make_reference
 from hil.core.types import Estimate, Pose, Vec2
 
@@ -24,12 +25,16 @@ State = tuple[float, float, float, float, float]  # X, Y, theta, eta1, eta2
 
 # Section 8.9 as tried in control.md section 2. K places the poles of the state feedback at -2, -4
 # (the k1, k2 of the backstepping stages) and -4.
-CIRCLE_GAINS = Gains(
-    asg_ism=AsgIsmGains(
-        k1_s=2, k2_s=4, alpha_m_s3=4, eps0_m_s2=0, eps_min_m_s2=0.02, mu0_s=1, sigma_m_s2=0.05
-    ),
-    pid=PidGains(kp_s3=32, ki_s4=0, kd1_s2=32, kd2_s=10),
-)
+CIRCLE_LAYER_M_S2 = 0.02
+CIRCLE_GAINS = make_gains(
+    {
+        "asg_ism": {
+            "k1_s": 2, "k2_s": 4, "alpha_m_s3": 4, "eps0_m_s2": 0, "eps_min_m_s2": CIRCLE_LAYER_M_S2,
+            "mu0_s": 1, "sigma_m_s2": 0.05,
+        },
+        "pid": {"kp_s3": 32, "ki_s4": 0, "kd1_s2": 32, "kd2_s": 10},
+    }
+)  # fmt: skip
 # Restrictions out of the way: the evaluation has none, and eta1 stays far from 0.
 CIRCLE_LIMITS = OuterLimits(
     eta1_max_m_s=5,

@@ -14,13 +14,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from hil.config.control import Gains, PointReference
+from hil.config.control import PointReference
 from hil.config.events import Disturbance
 from hil.config.load import load_scenario
+from hil.core.registries import OUTER_LAWS
+from hil.core.registry import Box
 from hil.core.types import wrap_pi
 from hil.record.manifest import replace_file
 
 if TYPE_CHECKING:
+    from hil.config.gains import Gains
     from hil.config.scenario import Scenario
 
 Figures = Mapping[str, float]
@@ -28,8 +31,6 @@ Figures = Mapping[str, float]
 Evaluate = Callable[[Sequence["Trial"]], Sequence[Figures]]
 # (candidates done, best cost so far)
 Progress = Callable[[int, float], None]
-# name -> (least, start, largest) of what is searched, on a logarithmic scale
-Box = Mapping[str, tuple[float, float, float]]
 
 # A run's cost is the sum of weight * figure: error, time to come within 20 mm, where it rests (1 mm is
 # worth half a second of settling), and the variation of the commands (chatter) at about a tenth of the
@@ -44,25 +45,8 @@ COST_WEIGHTS = {
 # Cost of a run that gives no figure: a safety stop, a law that diverged, never within 20 mm.
 COST_FAILED = 20.0
 
-# Per law, the gains searched with their bounds, and the start: poles at -1, -2, -3 for both laws
-# (inside its layer the sliding stage has the pole -alpha/eps).
-SEARCH: dict[str, dict[str, tuple[float, float, float]]] = {
-    "asg-ism": {
-        "k1_s": (0.2, 1.0, 5.0),
-        "k2_s": (0.5, 3.0, 20.0),
-        "alpha_m_s3": (0.01, 1.0, 30.0),
-        "eps0_m_s2": (1e-3, 0.5, 5.0),
-        "eps_min_m_s2": (0.01, 0.5, 5.0),
-        "mu0_s": (0.2, 1.0, 30.0),
-        "sigma_m_s2": (1e-3, 0.01, 1.0),
-    },
-    "pid": {
-        "kp_s3": (0.3, 6.0, 200.0),
-        "ki_s4": (1e-4, 0.01, 20.0),
-        "kd1_s2": (1.0, 11.0, 200.0),
-        "kd2_s": (1.0, 6.0, 40.0),
-    },
-}
+# What is searched of each law that is compared, as the law declares it.
+SEARCH: dict[str, Box] = {name: OUTER_LAWS.get(name).search for name in ("asg-ism", "pid")}
 
 
 # What pushes the robot in a pushed case: a tenth of the robot's weight along its
@@ -176,10 +160,7 @@ def decode(box: Box, point: Sequence[float]) -> dict[str, float]:
 
 def with_values(base: Gains, outer: str, values: Mapping[str, float]) -> Gains:
     """Return `base` with the searched gains of one law replaced."""
-    table = outer.replace("-", "_")
-    tree = base.model_dump()
-    tree[table].update(values)
-    return Gains.model_validate(tree)
+    return base.with_values(OUTER_LAWS.get(outer), values)
 
 
 def minimise(
@@ -258,7 +239,7 @@ def near_bounds(gains: Gains) -> list[str]:
     """Return what lies within 3 % of the way to an edge of its search box, where the box decided."""
     found = []
     for outer, box in SEARCH.items():
-        values = gains.model_dump()[outer.replace("-", "_")]
+        values = gains.of(OUTER_LAWS.get(outer)).model_dump()
         for name, (low, _, high) in box.items():
             at = math.log(values[name] / low) / math.log(high / low)
             if not 0.03 < at < 0.97:

@@ -11,7 +11,7 @@ from hil.analysis.stats import Paired, paired
 from hil.study.tune import SEARCH, Case, Figures, Trial, run_cost
 
 if TYPE_CHECKING:
-    from hil.config.control import Gains
+    from hil.config.gains import Gains
 
 # The tape that judges: the scenarios as they ship, with seeds that no search uses.
 HELD_OUT_SCENARIOS = ("scenario-1", "scenario-2", "scenario-3")

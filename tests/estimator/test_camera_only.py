@@ -5,7 +5,7 @@ import math
 import pytest
 
 from hil.config.control import EstimatorConfig
-from hil.control.estimators import make_estimator
+from hil.control.estimators.making import make_estimator
 from hil.core.types import Pose, PoseMeasurement
 from tests.estimator.world import TRUE, Conditions, World
 

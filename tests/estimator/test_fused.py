@@ -6,7 +6,8 @@ import time
 import pytest
 
 from hil.config.control import EstimatorConfig
-from hil.control.estimators import BelievedGeometry, make_estimator
+from hil.control.estimators.geometry import BelievedGeometry
+from hil.control.estimators.making import make_estimator
 from hil.core.errors import BadInput
 from hil.core.types import Pose, PoseMeasurement, WheelSample
 from tests.estimator.world import LAG_S, TRUE, Conditions, World
@@ -253,7 +254,7 @@ def test_a_tick_is_cheap():
 
 def test_unknown_estimator_is_refused_by_name():
     """The message names the value and the choice."""
-    with pytest.raises(BadInput, match=r"'magic'.*fused, camera-only"):
+    with pytest.raises(BadInput, match=r"'magic'.*camera-only, fused"):
         make_estimator("magic", CONFIG, TRUE)
 
 

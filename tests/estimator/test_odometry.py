@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from hil.control.estimators import BelievedGeometry
 from hil.control.estimators._fused import CommandHistory, Geometry, WheelSpeeds, counts_between
+from hil.control.estimators.geometry import BelievedGeometry
 
 ROBOT = BelievedGeometry(0.05, 0.2, 0.03, 1920)
 

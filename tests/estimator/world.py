@@ -7,7 +7,7 @@ import random
 from collections import deque
 from dataclasses import dataclass
 
-from hil.control.estimators import BelievedGeometry
+from hil.control.estimators.geometry import BelievedGeometry
 from hil.core.types import Estimator, Pose, PoseMeasurement, WheelSample, wrap_pi
 
 TRUE = BelievedGeometry(0.0482, 0.2166, 0.03, 1920)

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from hil.config.control import OuterLimits
-from hil.control.laws import make_outer_law
+from hil.control.laws.making import make_outer_law
 from hil.core.types import ReferenceState
 from hil.study.ideal_circle import CIRCLE_GAINS
 from tests.laws.support import D0_M, estimate, point

@@ -4,10 +4,11 @@ import math
 
 import pytest
 
-from hil.config.control import CircleReference, OuterLimits, PidGains
-from hil.control.laws import asg_ism, make_outer_law, state_feedback
+from hil.config.control import CircleReference, OuterLimits
+from hil.control.laws import asg_ism, state_feedback
 from hil.control.laws.chain import Chain
-from hil.control.laws.state_feedback import StateFeedback
+from hil.control.laws.making import make_outer_law
+from hil.control.laws.state_feedback import PidGains, StateFeedback
 from hil.core.errors import BadInput
 from hil.core.types import ReferenceState
 from hil.study import ideal_circle

@@ -6,7 +6,8 @@ from collections import Counter
 
 import pytest
 
-from hil.config.control import ControlConfig, Gains
+from hil.config.control import ControlConfig
+from hil.config.gains import Gains
 from hil.config.load import load_scenario
 from hil.study.tune import (
     CASES,

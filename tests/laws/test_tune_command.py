@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from hil.cli.tune import command
-from hil.config.control import Gains
+from hil.config.gains import Gains
 from hil.core.errors import BadInput
 from tests.laws.test_tune import STILL, distance
 

@@ -17,9 +17,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.config.camera import MarkConfig, MarksConfig
+from hil.config.camera import CameraConfig, MarkConfig, MarksConfig
+from hil.core.registries import LOCALISERS
 from hil.core.types import Pose, PoseMeasurement, wrap_pi
 from vision.camera import CameraModel
+from vision.camera_setup import camera_model
 from vision.disc_fit import Disc, Marks, Point, RimFitter
 
 Array = NDArray[np.float64]
@@ -295,3 +297,9 @@ def _response(mark: MarkConfig) -> Array:
     colour = np.asarray(mark.colour)
     weights: Array = colour - colour.mean()
     return weights / np.linalg.norm(weights)
+
+
+@LOCALISERS.register("marks", summary="colour marks on the robot's plate, as in the thesis")
+def make_marks(camera: CameraConfig) -> MarkLocaliser:
+    """Return the localiser of the colour marks that a camera's file describes."""
+    return MarkLocaliser(camera_model(camera), camera.marks)

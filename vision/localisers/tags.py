@@ -16,10 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.config.camera import TagConfig
+from hil.config.camera import CameraConfig, TagConfig
+from hil.core.registries import LOCALISERS
 from hil.core.types import Pose, PoseMeasurement, wrap_pi
 from vision import cv_compat
 from vision.camera import CameraModel
+from vision.camera_setup import camera_model
 from vision.pose_fit import fit_pose
 
 Array = NDArray[np.float64]
@@ -315,3 +317,9 @@ def _fit_square(square: _Outline, points: Array, normals: Array, contrast_dn: fl
     )
     residual = float(np.sqrt(np.mean(rest[keep] ** 2)))
     return _Outline(pose, square.side_m + 2.0 * dhalf, residual, int(keep.sum()), contrast_dn)
+
+
+@LOCALISERS.register("tags", summary="one ArUco or AprilTag of a stated size on the robot's plate")
+def make_tags(camera: CameraConfig) -> TagLocaliser:
+    """Return the localiser of the tag that a camera's file describes."""
+    return TagLocaliser(camera_model(camera), camera.tag or TagConfig(), camera.marks.height_m)

@@ -11,6 +11,7 @@ import math
 from typing import TYPE_CHECKING
 
 from hil.board._firmware import SuperTwisting
+from hil.core.registries import ESTIMATORS
 from hil.core.types import Estimate, Pose, PoseMeasurement, WheelSample, wrap_pi
 
 if TYPE_CHECKING:
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 _GAP_S = 0.5
 
 
+@ESTIMATORS.register(
+    "camera-only", summary="the thesis's variant: differentiators on camera poses alone"
+)
 class CameraOnly:
     """Selectable for comparison with the default."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from hil.control.estimators import _fused
+from hil.core.registries import ESTIMATORS
 from hil.core.types import Estimate, Pose, PoseMeasurement, WheelSample
 
 if TYPE_CHECKING:
@@ -20,6 +21,9 @@ def assumptions(config: EstimatorConfig) -> _fused.Assumptions:
     return native
 
 
+@ESTIMATORS.register(
+    "fused", summary="camera poses and wheel counts fused, predicted to the actuation"
+)
 class Fused(_fused.Fused):
     """Camera poses and wheel counts fused at the exposure time, predicted to the actuation time.
 

@@ -9,16 +9,47 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from pydantic import Field
+
+from hil.config.base import Section
 from hil.control.laws.chain import Chain, ChainState, restrict
 from hil.control.laws.trace import make_trace
+from hil.core.registries import OUTER_LAWS
 from hil.core.types import OuterCommand
 
 if TYPE_CHECKING:
-    from hil.config.control import AsgIsmGains, OuterLimits
+    from hil.config.control import OuterLimits
     from hil.core.types import Estimate, ReferenceState, Vec2
 
 # Below this error the exponents p and p - 1 are continued as at it: |d|^(p-2) has no bound at 0.
 _SMALL = 1e-3
+
+
+class AsgIsmGains(Section):
+    """Gains of backstepping with ASG-ISM (8.6)-(8.22), control.md section 2."""
+
+    k1_s: float = Field(gt=0, le=100, description="1/s at p = 1, position error to speed")
+    k2_s: float = Field(gt=0, le=100, description="1/s at p = 1, speed error to acceleration")
+    p: float = Field(1.0, ge=1, le=3, description="exponent 1 + epsilon of (8.6), (8.11)")
+    alpha_m_s3: float = Field(ge=0, le=1e4, description="m/s^3, gain of the sliding term")
+    eps0_m_s2: float = Field(0.0, ge=0, le=100, description="m/s^2, layer eps0/(t+mu0)^(1+beta)")
+    beta: float = Field(0.5, gt=0, lt=1, description="rate at which the layer shrinks, (4.20)")
+    eps_min_m_s2: float = Field(gt=0, le=100, description="m/s^2, floor of the layer")
+    mu0_s: float = Field(gt=0, le=100, description="s, mu = 1/(t + mu0)")
+    sigma_m_s2: float = Field(ge=0, le=100, description="m/s^2, scale of the cost H in Psi")
+
+
+# Bounds and start of a search: poles at -1, -2, -3 to begin with, as for every law (inside its layer
+# the sliding stage has the pole -alpha/eps).
+SEARCH = {
+    "k1_s": (0.2, 1.0, 5.0),
+    "k2_s": (0.5, 3.0, 20.0),
+    "alpha_m_s3": (0.01, 1.0, 30.0),
+    "eps0_m_s2": (1e-3, 0.5, 5.0),
+    "eps_min_m_s2": (0.01, 0.5, 5.0),
+    "mu0_s": (0.2, 1.0, 30.0),
+    "sigma_m_s2": (1e-3, 0.01, 1.0),
+}
 
 
 def power(d: float, d_dot: float, d_ddot: float, k: float, p: float) -> tuple[float, float, float]:
@@ -37,6 +68,13 @@ def sign(x: float) -> float:
     return 1.0 if x > 0.0 else -1.0 if x < 0.0 else 0.0
 
 
+@OUTER_LAWS.register(
+    "asg-ism",
+    settings=AsgIsmGains,
+    search=SEARCH,
+    summary="backstepping with an averaged sub-gradient integral sliding mode",
+    colour="#d55e00",
+)
 class AsgIsm:
     """The proposed outer law; one instance runs one robot."""
 

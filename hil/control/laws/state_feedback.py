@@ -10,17 +10,46 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from pydantic import Field
+
+from hil.config.base import Section
 from hil.control.laws.chain import Chain, authority, restrict
 from hil.control.laws.trace import make_trace
+from hil.core.registries import OUTER_LAWS
 from hil.core.types import OuterCommand
 
 if TYPE_CHECKING:
-    from hil.config.control import OuterLimits, PidGains
+    from hil.config.control import OuterLimits
     from hil.core.types import Estimate, ReferenceState
 
 _ZERO = (0.0, 0.0)
 
 
+class PidGains(Section):
+    """Gains of the state feedback in PID form on the linearised chain (control.md section 2)."""
+
+    kp_s3: float = Field(gt=0, le=1e6, description="1/s^3, on delta1")
+    ki_s4: float = Field(0.0, ge=0, le=1e6, description="1/s^4, on the integral of delta1")
+    kd1_s2: float = Field(gt=0, le=1e6, description="1/s^2, on d delta1/dt")
+    kd2_s: float = Field(gt=0, le=1e4, description="1/s, on d2 delta1/dt2")
+
+
+# Bounds and start of a search: poles at -1, -2, -3 to begin with, as for every law.
+SEARCH = {
+    "kp_s3": (0.3, 6.0, 200.0),
+    "ki_s4": (1e-4, 0.01, 20.0),
+    "kd1_s2": (1.0, 11.0, 200.0),
+    "kd2_s": (1.0, 6.0, 40.0),
+}
+
+
+@OUTER_LAWS.register(
+    "pid",
+    settings=PidGains,
+    search=SEARCH,
+    summary="state feedback in PID form on the linearised chain",
+    colour="#0072b2",
+)
 class StateFeedback:
     """The PID law; one instance runs one robot."""
 
