@@ -55,7 +55,7 @@ class Gains(OpenSection):
 def _unpickled(tables: dict[str, Any], sources: Sequence[SourceText]) -> Gains:
     """Return a gain set in another process, which gets to know the laws from files by it."""
     for source in sources:
-        OUTER_LAWS.load_text(source)
+        OUTER_LAWS.adopt(source)
     return make_gains(tables)
 
 

@@ -200,11 +200,15 @@ class Registry:
 
     def load_text(self, source: SourceText, wanted: str = "") -> Entry:
         """Return the entry that a source text defines (`wanted` of several); raises BadInput."""
+        return self._choose(source, self.adopt(source), wanted)
+
+    def adopt(self, source: SourceText) -> tuple[Entry, ...]:
+        """Make all that a source text defines known; raises BadInput."""
         known = self._files.get((source.path, source.sha256))
         if known is None:
             known = self._files[(source.path, source.sha256)] = self._run(source)
         self._entries |= {entry.name: entry for entry in known}
-        return self._choose(source, known, wanted)
+        return known
 
     def _run(self, source: SourceText) -> tuple[Entry, ...]:
         """Execute a file and return what it registered here."""
