@@ -4,7 +4,7 @@ Each figure is declared once in METRICS with its unit and with what is better. E
 are taken from the truth where the record has it, else from the estimate, and `basis` says which.
 Commands are held between ticks, so their integrals are step sums; errors are integrated by the
 trapezoidal rule. A figure that does not exist for a run (no sliding variable under PID, never
-settled) is NaN, null in JSON, and does not satisfy a requirement.
+settled, fewer than two ticks) is NaN, null in JSON, and does not satisfy a requirement.
 """
 
 from __future__ import annotations
@@ -169,11 +169,11 @@ class Verdict:
 
 
 def compute(columns: Columns, link: LinkStats | None = None) -> Figures:
-    """Return every figure of a run from its samples; raises BadInput below two rows."""
+    """Return every figure of a run from its samples; all are NaN below two rows."""
     t_s = columns["t_s"]
-    if t_s.size < 2:
-        raise BadInput(f"run record: {t_s.size} rows of samples, the figures need at least 2")
     true_error = has_truth(columns)
+    if t_s.size < 2:
+        return Figures("truth" if true_error else "estimate", dict.fromkeys(BY_NAME, math.nan))
     values = (
         _error_figures(t_s, error_norm(columns))
         | _motion_figures(columns, "true" if true_error else "est")
@@ -186,7 +186,8 @@ def compute(columns: Columns, link: LinkStats | None = None) -> Figures:
 
 def has_truth(columns: Columns) -> bool:
     """Say whether the record knows the true state of the robot."""
-    return bool(np.isfinite(columns["true_delta1_x_m"]).all())
+    known = np.isfinite(columns["true_delta1_x_m"])
+    return bool(known.size and known.all())
 
 
 def error_norm(columns: Columns) -> Array:

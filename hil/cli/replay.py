@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hil.cli.options import LAWS, json_option, print_json, set_option
+from hil.cli.options import LAWS, json_option, plain_console, print_json, set_option
+from hil.text import visible
 
 if TYPE_CHECKING:
     from hil.replays.exact import ReplayReport
@@ -87,12 +88,10 @@ def command(
 
 def print_report(report: ReplayReport) -> None:
     """Write the verdict and every channel that differs to stdout."""
-    from rich.console import Console
-
-    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console = plain_console()
     for problem in report.problems:
-        console.print(f"note: {problem}")
-    console.print(headline(report))
+        console.print(f"note: {visible(problem)}")
+    console.print(visible(headline(report)))
     different = [channel for channel in report.channels if not channel.same]
     if not different:
         return

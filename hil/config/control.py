@@ -59,6 +59,14 @@ class OuterLimits(Section):
         0.006, gt=0, le=1, description="m, pushed away: start anew beyond; well above hold_enter_m"
     )
 
+    @model_validator(mode="after")
+    def _leaves_beyond_entering(self) -> OuterLimits:
+        if self.hold_leave_m < self.hold_enter_m:
+            raise ValueError(
+                f"hold_leave_m must be at least hold_enter_m = {self.hold_enter_m:g} m"
+            )
+        return self
+
 
 class AsgIsmGains(Section):
     """Gains of backstepping with ASG-ISM (8.6)-(8.22), control.md section 2."""

@@ -55,7 +55,8 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
     names. Raises BadInput.
     """
     tree = read_tree(name_or_path, "scenarios")
-    tree["board"] = board_defaults() | tree.get("board", {})
+    board = tree.get("board", {})
+    tree["board"] = board_defaults() | board if isinstance(board, dict) else board
     scenario = build(Scenario, tree, name_or_path)
     if overrides:
         return with_overrides(scenario, overrides)
@@ -95,21 +96,28 @@ def check_board(values: Mapping[str, float]) -> None:
             )
 
 
-def read_tree(name_or_path: str, kind: str) -> Tree:
-    """Return a file's tables laid over those of its `base`, robot and camera files filled in."""
+def read_tree(name_or_path: str, kind: str, above: tuple[str, ...] = ()) -> Tree:
+    """Return a file's tables laid over those of its `base`, robot and camera files filled in.
+
+    `above` are the files that lie on this one.
+    """
+    if name_or_path in above:
+        raise BadInput(f"{name_or_path}: lies on itself: {' on '.join((*above, name_or_path))}")
+    above = (*above, name_or_path)
     text, where, folder = _read_text(name_or_path, kind)
     try:
         tree = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # a number or brackets beyond what Python takes
         raise BadInput(f"{where}: not valid TOML: {error}") from None
     for part in ("robot", "camera"):
         if isinstance(tree.get(part), Mapping) and "file" in tree[part]:
             own = dict(tree[part])
-            below = read_tree(_beside(folder, str(own.pop("file"))), f"{part}s")
+            below = read_tree(_beside(folder, str(own.pop("file"))), f"{part}s", above)
             tree[part] = merge(below, own)
     base = tree.pop("base", None)
     if base is not None:
-        tree = merge(read_tree(_beside(folder, str(base)), _base_kind(str(base), kind)), tree)
+        below = read_tree(_beside(folder, str(base)), _base_kind(str(base), kind), above)
+        tree = merge(below, tree)
     return tree
 
 
@@ -200,7 +208,7 @@ def _find(tree: Tree, key: str) -> tuple[Any, Any]:
         rest = ".".join(parts[depth:])
         if isinstance(node, dict) and rest in node:  # a key may have dots itself (mismatch)
             return node, rest
-        index: Any = int(part) if isinstance(node, list) and part.isdigit() else part
+        index: Any = int(part) if isinstance(node, list) and _is_index(part) else part
         last = depth == len(parts) - 1
         if isinstance(node, dict) and index in node:
             pass
@@ -212,12 +220,22 @@ def _find(tree: Tree, key: str) -> tuple[Any, Any]:
     return None, None
 
 
+def _is_index(part: str) -> bool:
+    """Say whether a part of a dotted name counts into a list: a few plain digits."""
+    return part.isascii() and part.isdecimal() and len(part) <= 9
+
+
 def parse_value(text: str) -> Any:
     """Return a TOML value, or the text itself where it is not one (so names need no quotes)."""
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        tree = tomllib.loads(f"value = {text}")
+    except (
+        ValueError,
+        RecursionError,
+    ):  # no TOML, or a number or brackets beyond what Python takes
         return text.strip()
+    # A line end in the text would begin another key.
+    return tree["value"] if len(tree) == 1 else text.strip()
 
 
 def dotted_names(tree: Any, prefix: str = "") -> list[str]:
@@ -258,7 +276,16 @@ def _explain(error: ValidationError, tree: Tree) -> str:
     unit = unit_of(key)
     if first["type"].startswith(("greater_than", "less_than")):
         limit = f"{limit} {unit}".strip()
-    return f"{key} = {f'{value!r} {unit}'.strip()}: {limit}{rest}"
+    return f"{key} = {f'{_short(value)} {unit}'.strip()}: {limit}{rest}"
+
+
+def _short(value: Any) -> str:
+    """Return a value as a message shows it: of a very long one its beginning."""
+    try:
+        text = repr(value)
+    except ValueError:  # an integer of thousands of digits
+        return "a number of thousands of digits"
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def _key(loc: tuple[int | str, ...], tree: Tree) -> str:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from hil.config.base import Section
+from hil.text import is_plain_name
 
 
 class MotorConfig(Section):
@@ -59,6 +60,12 @@ class BatteryConfig(Section):
     resistance_ohm: float = Field(ge=0, le=5, description="cells, plug and leads")
     charge_start_ratio: float = Field(gt=0, le=1, description="charge when the run begins")
     idle_a: float = Field(ge=0, le=10, description="current of board, radio and encoders")
+
+    @model_validator(mode="after")
+    def _empties(self) -> Self:
+        if self.empty_v > self.full_v:
+            raise ValueError(f"empty_v must be at most full_v = {self.full_v:g} V")
+        return self
 
 
 class FloorConfig(Section):
@@ -115,6 +122,13 @@ class RobotConfig(Section):
     battery: BatteryConfig
     floor: FloorConfig
     bring_up: BringUpConfig | None = Field(None, description="measured, for people to compare with")
+
+    @field_validator("name")
+    @classmethod
+    def _is_plain(cls, name: str) -> str:
+        if not is_plain_name(name):
+            raise ValueError("no / or \\, nothing that does not show")
+        return name
 
     @model_validator(mode="after")
     def _current_slow_enough(self) -> Self:

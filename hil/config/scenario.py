@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, field_validator, model_validator
 
 from hil.config.base import Section
 from hil.config.camera import CameraConfig
@@ -12,6 +12,8 @@ from hil.config.control import ControlConfig, ReferenceConfig
 from hil.config.events import Disturbance, Fault
 from hil.config.link import LinkConfig
 from hil.config.robot import RobotConfig
+from hil.core.errors import BadInput
+from hil.text import is_plain_name
 
 
 class StartPose(Section):
@@ -29,6 +31,29 @@ class Requirement(Section):
     min: float | None = Field(None, description="lowest value that holds, in the figure's unit")
     max: float | None = Field(None, description="highest value that holds, in the figure's unit")
 
+    @field_validator("metric")
+    @classmethod
+    def _is_a_figure(cls, name: str) -> str:
+        # Here and not above: numpy costs the command line a tenth of a second it seldom needs.
+        from hil.analysis.metrics import require_known  # noqa: PLC0415
+
+        try:
+            return require_known(name)
+        except BadInput as error:
+            raise ValueError(str(error)) from None
+
+    @model_validator(mode="after")
+    def _can_hold_and_fail(self) -> Self:
+        if self.min is None and self.max is None:
+            raise ValueError(
+                f"{self.metric} has neither min nor max: it would always hold; give one"
+            )
+        if self.min is not None and self.max is not None and self.min > self.max:
+            raise ValueError(
+                f"{self.metric}: min = {self.min:g} is above max = {self.max:g}: it could never hold"
+            )
+        return self
+
 
 class SafetyConfig(Section):
     """When the host stops the robot by itself."""
@@ -39,6 +64,16 @@ class SafetyConfig(Section):
     fence_x_max_m: float = Field(1.0, description="geofence of the centre of mass, world X")
     fence_y_min_m: float = Field(-0.75, description="geofence of the centre of mass, world Y")
     fence_y_max_m: float = Field(0.75, description="geofence of the centre of mass, world Y")
+
+    @model_validator(mode="after")
+    def _fence_has_an_inside(self) -> Self:
+        for axis in "xy":
+            low, high = (getattr(self, f"fence_{axis}_{end}_m") for end in ("min", "max"))
+            if low >= high:
+                raise ValueError(
+                    f"fence_{axis}_min_m = {low:g} m must be below fence_{axis}_max_m = {high:g} m"
+                )
+        return self
 
 
 class Scenario(Section):
@@ -67,3 +102,10 @@ class Scenario(Section):
     safety: SafetyConfig = SafetyConfig()
     disturbances: tuple[Disturbance, ...] = ()
     faults: tuple[Fault, ...] = ()
+
+    @field_validator("name")
+    @classmethod
+    def _names_a_folder(cls, name: str) -> str:
+        if not is_plain_name(name):
+            raise ValueError("names the folder of a record: no / or \\, nothing that does not show")
+        return name

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -59,6 +60,15 @@ def exit_status(record: RunRecord) -> int:
     if outcome != "complete":
         return 130 if outcome == "interrupted" else 3
     return 0 if all(verdict.holds for verdict in record.verdicts()) else 1
+
+
+def judged_status(records: Iterable[RunRecord]) -> int:
+    """Return the exit status of a command that looks at recorded runs.
+
+    As a run's own, the gravest of all; but a record that was stopped by Ctrl-C or cut off has failed
+    its requirements (1): this command was not stopped.
+    """
+    return max(3 if r.manifest.outcome == "fault" else min(exit_status(r), 1) for r in records)
 
 
 def camera_for(scenario: Scenario, target: str, asked: str | None) -> str:
