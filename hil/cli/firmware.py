@@ -98,7 +98,7 @@ def list_parameters(target: str) -> None:
 @click.option("--store", is_flag=True, help="Keep them in the EEPROM as well.")
 def set_parameters(target: str, settings: tuple[str, ...], store: bool) -> None:
     """Set parameters within their bounds; all are checked before the first is sent."""
-    from hil.config.load import check_board
+    from hil.limits import check_board
     from hil.tools.board_parameters import open_board
 
     values: dict[str, float] = {}

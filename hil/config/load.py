@@ -14,10 +14,10 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from hil.board._firmware import parameter_table
 from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
+from hil.limits import board_defaults, check_board
 
 Tree = dict[str, Any]
 Model = TypeVar("Model", bound=BaseModel)
@@ -74,26 +74,6 @@ def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
     changed = build(Scenario, tree, "--set")
     check_board(changed.board)
     return changed
-
-
-def board_defaults() -> dict[str, float]:
-    """Return every parameter of the board with the default its firmware has."""
-    return {entry.name: entry.default for entry in parameter_table()}
-
-
-def check_board(values: Mapping[str, float]) -> None:
-    """Raise BadInput for a board parameter that does not exist or lies outside its bounds."""
-    table = {entry.name: entry for entry in parameter_table()}
-    for name, value in values.items():
-        entry = table.get(name)
-        if entry is None:
-            near = difflib.get_close_matches(name, table, n=3, cutoff=0.5) or list(table)
-            raise BadInput(f"board.{name}: no such parameter of the board; near: {', '.join(near)}")
-        if not entry.minimum <= value <= entry.maximum:
-            raise BadInput(
-                f"board.{name} = {value:g} {entry.unit}: allowed are {entry.minimum:g} to "
-                f"{entry.maximum:g} {entry.unit}".rstrip()
-            )
 
 
 def read_tree(name_or_path: str, kind: str, above: tuple[str, ...] = ()) -> Tree:

@@ -6,11 +6,13 @@ Bounds stand here; the numbers and where each one comes from stand in the robot 
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from hil.config.base import Section
+from hil.limits import board_table
 from hil.text import is_plain_name
 
 
@@ -81,6 +83,7 @@ class FloorConfig(Section):
     )
 
 
+_COUNTS = board_table()["ENC_COUNTS"]
 Magnitude = Annotated[float, Field(ge=0, le=1000)]
 Sides = tuple[Magnitude, Magnitude]
 
@@ -113,7 +116,11 @@ class RobotConfig(Section):
     rear_axle_m: float = Field(ge=0.01, le=2, description="b, centre of mass to rear axle")
     d0_m: float = Field(ge=0.005, le=1, description="d0 of the operative constraint (2.31)")
     wheel_inertia_kg_m2: float = Field(ge=0, le=0.1, description="one wheel about its axle")
-    encoder_counts_per_turn: int = Field(ge=4, le=100_000, description="x4 counts a wheel turn")
+    encoder_counts_per_turn: int = Field(
+        ge=math.ceil(_COUNTS.minimum),
+        le=math.floor(_COUNTS.maximum),
+        description="x4 counts a wheel turn; bounds are the board's (ENC_COUNTS)",
+    )
     board_clock_ppm: float = Field(
         ge=-10_000, le=10_000, description="board clock fast against true time, parts per million"
     )

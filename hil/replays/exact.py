@@ -43,6 +43,9 @@ if TYPE_CHECKING:
 
 Kind = Literal["exact", "shadow"]
 COMMANDS = ("eta1_cmd_m_s", "theta_dot_cmd_rad_s", "omega_cmd_left_rad_s", "omega_cmd_right_rad_s")
+# What the record alone decides, and what makes its task.
+_HAPPENED = ("duration_s", "start", "mismatch", "disturbances", "faults")
+_TASK = ("name", "reference", *_HAPPENED)
 # Taken over from the record to complete the rows, not computed again.
 _GIVEN = tuple(name for name in SAMPLE_NAMES if name.startswith("true_"))
 _FRAME_CHECKS = tuple(name for name in FRAME_NAMES if name not in {"t_cam_s", "index"})
@@ -169,6 +172,7 @@ def replay(
     Raises BadInput when the folder is no record, has nothing to replay, or a change makes no sense.
     """
     source = read_source(path)
+    _refuse_without_ticks(source)
     recorded = build(Scenario, source.manifest.scenario, str(path / layout.MANIFEST))
     scenario = _changed(recorded, overrides)
     law = outer or source.manifest.outer
@@ -212,15 +216,38 @@ def replay(
     )
 
 
+def _refuse_without_ticks(source: Source) -> None:
+    """Raise BadInput when the run ended before its first tick: there is nothing to reproduce."""
+    if source.samples and not source.samples["t_s"].size:
+        why = source.manifest.outcome_detail or source.manifest.outcome
+        raise BadInput(
+            f"{source.path}: has no tick: the run ended before its first one ({why}); nothing to "
+            "replay"
+        )
+
+
 def _changed(recorded: Scenario, overrides: Sequence[str]) -> Scenario:
     """Return the scenario of a shadow; what the record alone decides cannot be changed."""
     changed = with_overrides(recorded, overrides)
-    for key in ("duration_s", "start", "mismatch", "disturbances", "faults"):
+    for key in _HAPPENED:
         if getattr(changed, key) != getattr(recorded, key):
             raise BadInput(f"--set {key}: happened in the record and cannot be changed in a replay")
     if changed.control.rate_hz != recorded.control.rate_hz:
         raise BadInput("--set control.rate_hz: a replay has the ticks of the record")
     return changed
+
+
+def refuse_other_task(scenario: Scenario, recorded: Scenario, path: Path) -> None:
+    """Raise BadInput when a record of another task is to answer for a scenario (`--on replay:`)."""
+    pairs = {key: (getattr(scenario, key), getattr(recorded, key)) for key in _TASK}
+    pairs["control.rate_hz"] = (scenario.control.rate_hz, recorded.control.rate_hz)
+    for key, (asked, there) in pairs.items():
+        if asked != there:
+            shown = f" ({asked} asked, {there} recorded)" if isinstance(asked, str | float) else ""
+            raise BadInput(
+                f"--on replay:{path}: is a record of another task: {key} differs{shown}; name its "
+                "scenario and what was --set there, or use hil replay"
+            )
 
 
 def _channels(

@@ -20,9 +20,10 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from hil.board._firmware import BUILD_ID, TICK_US, Board, parameter_hash
-from hil.config.load import build, check_board, set_value
+from hil.config.load import build, set_value
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
+from hil.limits import check_board
 from hil.record import layout
 from hil.replays.exact import Source, read_source
 from hil.runs.execute import board_parameters

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from hil.core.rig import Rig
 
 SIMULATED = ("twin", "pil")
+REPLAY = "replay:"
 
 
 def open_rig(target: str, scenario: Scenario, camera: str, seed: int) -> Rig:
@@ -34,12 +35,14 @@ def open_rig(target: str, scenario: Scenario, camera: str, seed: int) -> Rig:
 
         device, baud = parse_target(target)
         return SerialRig(device, baud, open_source(camera, scenario.camera))
-    if target.startswith("replay:"):
+    if target.startswith(REPLAY):
         from hil.config.scenario import Scenario as Recorded  # noqa: PLC0415
-        from hil.replays.exact import open_replay, read_source  # noqa: PLC0415
+        from hil.replays.exact import open_replay, read_source, refuse_other_task  # noqa: PLC0415
 
-        source = read_source(Path(target.removeprefix("replay:")))
-        return open_replay(source, build(Recorded, source.manifest.scenario, str(source.path)))
+        source = read_source(Path(target.removeprefix(REPLAY)))
+        recorded = build(Recorded, source.manifest.scenario, str(source.path))
+        refuse_other_task(scenario, recorded, source.path)
+        return open_replay(source, recorded)
     raise BadInput(f"target {target!r}: unknown; choose twin, pil, serial:DEV[@BAUD] or replay:RUN")
 
 

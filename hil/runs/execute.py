@@ -14,14 +14,16 @@ import cv2
 from hil.analysis.metrics import LinkStats
 from hil.control.estimators import BelievedGeometry, make_estimator
 from hil.control.laws import make_outer_law
+from hil.control.laws.within import WithinWheelSpeed
 from hil.control.references import make_reference
 from hil.core.clocks import CameraClock
+from hil.limits import check_fit, notes, wheel_speed_max_rad_s
 from hil.record.manifest import Manifest, collect_versions, git_revision
 from hil.record.memory import MemoryRecorder
 from hil.record.recorder import Recorder
 from hil.record.tape import TapedRig
 from hil.record.timeline import Timeline
-from hil.rigs.opening import SIMULATED, open_rig
+from hil.rigs.opening import REPLAY, SIMULATED, open_rig
 from hil.runs.interruption import CtrlC
 from hil.runs.session import Parts, Progress, Publish, Session
 from hil.wire.identity import board_hashes
@@ -73,7 +75,7 @@ def judged_status(records: Iterable[RunRecord]) -> int:
 
 def camera_for(scenario: Scenario, target: str, asked: str | None) -> str:
     """Return the camera asked for, or the target's default one."""
-    if target.startswith("replay:"):
+    if target.startswith(REPLAY):
         return "as recorded"
     return asked or (scenario.camera_source if target in SIMULATED else "0")
 
@@ -101,6 +103,7 @@ def execute(
     estimate of every tick.
     """
     cv2.setNumThreads(1)  # search windows are small: handing them to threads costs more
+    check_fit(spec.scenario)
     parameters = board_parameters(spec.scenario, spec.inner)
     rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
     try:
@@ -128,6 +131,7 @@ def execute_in_memory(spec: RunSpec, rig: Rig | None = None) -> RunRecord:
 
     `rig` is another one than the spec's target names; it is closed here.
     """
+    check_fit(spec.scenario)
     parameters = board_parameters(spec.scenario, spec.inner)
     rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
     try:
@@ -154,6 +158,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink) -> Parts:
     geometry = BelievedGeometry(
         robot.wheel_radius_m, robot.track_m, robot.d0_m, robot.encoder_counts_per_turn
     )
+    law = make_outer_law(spec.outer, control.active_gains, control.limits, robot.d0_m)
     timeline = Timeline(recorder, _unix_us)
     return Parts(
         rig=rig,
@@ -161,7 +166,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink) -> Parts:
         camera_clock=CameraClock(scenario.camera.latency_s),
         localiser=MarkLocaliser(scenario.camera.model(), scenario.camera.marks),
         estimator=make_estimator(control.estimator, control.fusion, geometry),
-        law=make_outer_law(spec.outer, control.active_gains, control.limits, robot.d0_m),
+        law=WithinWheelSpeed(law, geometry, wheel_speed_max_rad_s(scenario)),
         reference=make_reference(scenario.reference),
         geometry=geometry,
         recorder=recorder,
@@ -186,6 +191,8 @@ def make_manifest(spec: RunSpec) -> Manifest:
             "set": spec.scenario.control.gain_set,
             "board": board_parameters(spec.scenario, spec.inner),
         },
+        open_loop_of=spec.target.removeprefix(REPLAY) if spec.target.startswith(REPLAY) else "",
+        notes=notes(spec.scenario),
         versions=collect_versions(),
         git_revision=git_revision(),
         start_time_utc=datetime.fromtimestamp(now_us * 1e-6, UTC).isoformat(timespec="seconds"),

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput
+from hil.limits import check_fit
 from hil.record import layout
 from hil.record.manifest import read_manifest, replace_file
 from hil.report.circle import CircleStudy
@@ -68,6 +69,8 @@ def deck_specs(deck: Deck, conditions: Conditions, folder: Path) -> list[RunSpec
     wears, so each repeat is a block in which the order is drawn, by `conditions.seed`.
     """
     scenarios = [load_scenario(name, conditions.overrides) for name in deck.scenarios]
+    for scenario in scenarios:
+        check_fit(scenario)
     _refuse_one_name_twice(deck, [scenario.name for scenario in scenarios])
     arms = [
         (scenario, law, inner)

@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from hil.config.load import check_board
 from hil.core.errors import BadInput
+from hil.limits import check_board
 from hil.record.manifest import replace_file
 from hil.rigs.serial import SerialRig, parse_target
 from hil.wire import handshake

@@ -18,9 +18,10 @@ from pydantic import Field, ValidationError, model_validator
 from hil.analysis.metrics import BY_NAME, Metric, require_known
 from hil.config.base import Section
 from hil.config.control import OuterLawName
-from hil.config.load import build, check_board, load_scenario, put_value, read_tree
+from hil.config.load import build, load_scenario, put_value, read_tree
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
+from hil.limits import check_board
 
 Point = dict[str, Any]
 InnerLawName = Literal["asg-ism", "pid"]
