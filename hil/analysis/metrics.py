@@ -169,11 +169,11 @@ class Verdict:
 
 
 def compute(columns: Columns, link: LinkStats | None = None) -> Figures:
-    """Return every figure of a run from its samples; all are NaN below two rows."""
+    """Return every figure of a run from its samples; raises BadInput below two rows."""
     t_s = columns["t_s"]
-    true_error = has_truth(columns)
     if t_s.size < 2:
-        return Figures("truth" if true_error else "estimate", dict.fromkeys(BY_NAME, math.nan))
+        raise BadInput(f"run record: {t_s.size} rows of samples, the figures need at least 2")
+    true_error = has_truth(columns)
     values = (
         _error_figures(t_s, error_norm(columns))
         | _motion_figures(columns, "true" if true_error else "est")
@@ -182,6 +182,11 @@ def compute(columns: Columns, link: LinkStats | None = None) -> Figures:
         | _timing_figures(columns, link or LinkStats())
     )
     return Figures("truth" if true_error else "estimate", values)
+
+
+def no_figures(columns: Columns) -> Figures:
+    """Return the figures of a run that ended before its second tick: there is none."""
+    return Figures("truth" if has_truth(columns) else "estimate", dict.fromkeys(BY_NAME, math.nan))
 
 
 def has_truth(columns: Columns) -> bool:

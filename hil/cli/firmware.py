@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from hil.core.errors import BadInput
+from hil.text import visible
 
 _FILE = click.Path(path_type=Path, dir_okay=False)
 _port_option = click.option(
@@ -29,7 +30,7 @@ def build(out: Path | None, fresh: bool) -> int:
     from hil.board import build
 
     made = build.build(out, fresh=fresh)
-    click.echo(f"build {made.build_id}: {made.elf} and {made.hex.name}")
+    click.echo(f"build {made.build_id}: {visible(str(made.elf))} and {made.hex.name}")
     click.echo(f"flash {made.flash_bytes} bytes, static RAM {made.ram_bytes} bytes")
     for line in made.over_budget():
         click.echo(f"over budget: {line}")
@@ -59,7 +60,7 @@ def codegen(check: bool) -> int:
             click.echo(line)
         return 1 if stale else 0
     for path in generator.write():
-        click.echo(f"written: {path}")
+        click.echo(f"written: {visible(str(path))}")
     return 0
 
 
@@ -125,7 +126,7 @@ def save_parameters(target: str, file: Path) -> None:
 
     with open_board(target) as board:
         write_file(file, board.parameters)
-    click.echo(f"written: {file}")
+    click.echo(f"written: {visible(str(file))}")
 
 
 @params.command("compare")

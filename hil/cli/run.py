@@ -92,7 +92,7 @@ def command(
     if view:
         from hil.record.viewer import open_viewer
 
-        click.echo(open_viewer([record.path]), err=True)
+        click.echo(visible(open_viewer([record.path])), err=True)
     return exit_status(record)
 
 

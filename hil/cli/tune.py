@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hil.cli.options import json_option, print_json
+from hil.text import visible
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -111,7 +112,7 @@ def _print(out: Path, gains: Gains, verdict: Verdict) -> None:
     for law, count in verdict.failed.items():
         if count:
             console.print(f"[yellow]note:[/yellow] {law}: {count} runs failed")
-    console.print(f"gain set: {out}")
+    click.echo(f"gain set: {visible(str(out))}")
 
 
 def _table(verdict: Verdict) -> Table:
