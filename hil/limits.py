@@ -60,7 +60,10 @@ def check_board(values: Mapping[str, float]) -> None:
 
 def check_fit(scenario: Scenario) -> None:
     """Raise BadInput where values that are allowed one by one cannot work together."""
+    from hil.rigs.opening import true_robot  # noqa: PLC0415 - which stands on the configuration
+
     board = board_defaults() | scenario.board
+    true_robot(scenario)  # the mismatch names numbers of the robot and keeps them in their bounds
     check_board(scenario.board)
     _check_counts(scenario, board)
     _check_set_points(scenario, board)

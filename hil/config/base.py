@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
+from pydantic.fields import FieldInfo
 
 
 class Section(BaseModel):
-    """One table of a TOML file; bounds stand on the fields, units in their names."""
+    """One table of a TOML file; bounds, unit and meaning of each number stand on its field."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -23,3 +25,26 @@ class Section(BaseModel):
                     near = difflib.get_close_matches(str(key), known, n=3, cutoff=0.5)
                     raise ValueError(f"unknown key {key!r}; near: {', '.join(near or known)}")
         return tree
+
+    @classmethod
+    def unit_of(cls, name: str, table: Mapping[str, Any]) -> str:  # noqa: ARG003 - of the whole table
+        """Return the unit of a value; a section in which another value decides it says so here."""
+        return str(extra_of(cls.model_fields[name]).get("unit", ""))
+
+
+def extra_of(field: FieldInfo) -> Mapping[str, Any]:
+    """Return what `quantity` keeps with a field: `unit` and `source`; empty for other fields."""
+    extra = field.json_schema_extra
+    return extra if isinstance(extra, Mapping) else {}
+
+
+def quantity(
+    unit: str, description: str, default: Any = ..., /, *, source: str = "", **bounds: Any
+) -> Any:
+    """Return a number's field: its unit, what it is and its bounds, as data.
+
+    `unit` is "" for a plain number and "(ratio)" for a share; `source` says where the default comes
+    from. `bounds` are pydantic's (ge, gt, le, lt, min_length, ...).
+    """
+    extra: dict[str, JsonValue] = {"unit": unit, "source": source}
+    return Field(default, description=description, json_schema_extra=extra, **bounds)

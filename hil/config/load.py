@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from hil.config.fields import told
 from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
@@ -21,23 +22,6 @@ from hil.limits import board_defaults, check_board
 
 Tree = dict[str, Any]
 Model = TypeVar("Model", bound=BaseModel)
-
-# Longest first, so that m_s2 is not read as s2.
-UNITS = {
-    "rad_s2": "rad/s^2", "m_s3": "m/s^3", "m_s2": "m/s^2", "rad_s": "rad/s", "m_s": "m/s",
-    "kg_m2": "kg m^2", "n_m_s": "N m s", "n_m": "N m", "bit_s": "bit/s", "baud": "bit/s",
-    "ratio": "(ratio)", "rad": "rad", "deg": "deg", "kg": "kg", "mm": "mm", "px": "px", "hz": "Hz",
-    "ohm": "ohm", "mv": "mV", "ms": "ms", "us": "us", "m": "m", "s": "s", "v": "V", "a": "A",
-    "h": "H", "n": "N",
-}  # fmt: skip
-
-
-def unit_of(key: str) -> str:
-    """Return the unit a key's name ends in ("" when it names none)."""
-    for suffix in sorted(UNITS, key=len, reverse=True):
-        if key.endswith(f"_{suffix}"):
-            return UNITS[suffix]
-    return ""
 
 
 def builtin_names(kind: str) -> list[str]:
@@ -237,10 +221,10 @@ def build(model: type[Model], tree: Tree, where: str) -> Model:
     try:
         return model.model_validate(tree)
     except ValidationError as error:
-        raise BadInput(f"{where}: {_explain(error, tree)}") from None
+        raise BadInput(f"{where}: {_explain(model, error, tree)}") from None
 
 
-def _explain(error: ValidationError, tree: Tree) -> str:
+def _explain(model: type[BaseModel], error: ValidationError, tree: Tree) -> str:
     """Return key, value with unit, and limit of the first violation."""
     first = error.errors(include_url=False)[0]
     key = _key(first["loc"], tree)
@@ -253,7 +237,7 @@ def _explain(error: ValidationError, tree: Tree) -> str:
     rest = f" (and {more} more)" if more else ""
     if isinstance(value, dict | list):
         return f"{key}: {limit}{rest}" if key else f"{limit}{rest}"
-    unit = unit_of(key)
+    unit = told(model, key, tree).unit
     if first["type"].startswith(("greater_than", "less_than")):
         limit = f"{limit} {unit}".strip()
     return f"{key} = {f'{_short(value)} {unit}'.strip()}: {limit}{rest}"

@@ -15,7 +15,7 @@ import numpy as np
 
 from hil.analysis.metrics import BY_NAME, METRICS, Metric
 from hil.analysis.stats import Adjusted, Paired, adjusted, paired
-from hil.report.compare import differences
+from hil.report.compare import differences, shown_cell
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from hil.config.deck import load_deck
-from hil.config.load import builtin_names, load_scenario, merge, unit_of
+from hil.config.load import builtin_names, load_scenario, merge
 from hil.core.errors import BadInput
 
 MINIMAL = """
@@ -128,10 +128,3 @@ def test_table_of_another_kind_replaces_the_one_below() -> None:
     assert merge(below, {"reference": {"y_m": 2.0}})["reference"] == {
         "kind": "point", "x_m": 1.0, "y_m": 2.0,
     }  # fmt: skip
-
-
-def test_units_are_read_from_names() -> None:
-    """The longest suffix counts: m_s2 is an acceleration, not seconds squared."""
-    assert unit_of("zeta_max_m_s2") == "m/s^2"
-    assert unit_of("mass_kg") == "kg"
-    assert unit_of("p") == ""
