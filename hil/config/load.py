@@ -146,7 +146,7 @@ def set_value(tree: Tree, text: str) -> None:
     key, equals, value_text = text.partition("=")
     key = key.strip()
     if not equals:
-        raise BadInput(f"--set {text!r}: needs KEY=VALUE, for example robot.mass_kg=3.1")
+        raise BadInput(f"--set {_clip(repr(text))}: needs KEY=VALUE, for example robot.mass_kg=3.1")
     put_value(tree, key, parse_value(value_text))
 
 
@@ -160,7 +160,7 @@ def put_value(tree: Tree, key: str, value: Any) -> None:
             name for name in names if name.split(".")[-1] == key.rsplit(".", maxsplit=1)[-1]
         ]
         hint = " or ".join(dict.fromkeys([*same_end[:2], *near])) or f"top level: {', '.join(tree)}"
-        raise BadInput(f"--set {key}: no such value; near: {hint}")
+        raise BadInput(f"--set {_clip(key)}: no such value; near: {hint}")
     parent[leaf] = value
 
 
@@ -249,6 +249,10 @@ def _short(value: Any) -> str:
         text = repr(value)
     except ValueError:  # an integer of thousands of digits
         return "a number of thousands of digits"
+    return _clip(text)
+
+
+def _clip(text: str) -> str:
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
