@@ -81,9 +81,9 @@ def _check_counts(scenario: Scenario, board: Mapping[str, float]) -> None:
     fastest_rad_s = _COUNTS_A_TICK / (TICK_US * 1e-6) * 2.0 * math.pi / counts
     if board["OVER_W"] > fastest_rad_s:
         raise BadInput(
-            f"board.OVER_W = {board['OVER_W']:g} rad/s: with {counts} counts a turn the board can "
-            f"count up to {fastest_rad_s:.3g} rad/s ({_COUNTS_A_TICK} counts a tick); set OVER_W, and "
-            "W_MAX with it, to that or less"
+            f"robot.encoder_counts_per_turn = {counts} counts/turn: the board counts up to "
+            f"{_COUNTS_A_TICK} a tick, at most {_below(fastest_rad_s):g} rad/s; board.OVER_W = "
+            f"{board['OVER_W']:g} rad/s is above; set it, and W_MAX with it, to that or less"
         )
 
 
@@ -99,7 +99,7 @@ def _check_set_points(scenario: Scenario, board: Mapping[str, float]) -> None:
         raise BadInput(
             f"control.rate_hz = {rate_hz:g} Hz: a set-point every {1e3 / rate_hz:.0f} ms, and the "
             f"board stops the robot {timeout_ms:g} ms after the last one (board.SP_TIMEOUT); at "
-            f"least {least_hz:.3g} Hz is needed"
+            f"least {-_below(-least_hz):g} Hz is needed"
         )
 
 
@@ -108,9 +108,14 @@ def _check_battery(scenario: Scenario, board: Mapping[str, float]) -> None:
     open_v = battery.empty_v + (battery.full_v - battery.empty_v) * battery.charge_start_ratio
     if open_v < board["BATT_LOW"]:
         raise BadInput(
-            f"board.BATT_LOW = {board['BATT_LOW']:g} V: robot.battery has {open_v:.3g} V at its "
+            f"board.BATT_LOW = {board['BATT_LOW']:g} V: robot.battery has {_below(open_v):g} V at its "
             "charge at the start, and the board does not arm below BATT_LOW; set it to this battery"
         )
+
+
+def _below(value: float) -> float:
+    """Return a limit for a message: 2 decimals, never beyond the limit itself."""
+    return math.floor(100.0 * value + 1e-6) / 100.0
 
 
 def wheel_speed_max_rad_s(scenario: Scenario) -> float:
