@@ -4,10 +4,22 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue, model_validator
 from pydantic.fields import FieldInfo
+
+from hil.text import is_plain_name
+
+
+def _plain(name: str) -> str:
+    if not is_plain_name(name):
+        raise ValueError("names a folder: no / or \\, and nothing that does not show")
+    return name
+
+
+# A name that becomes part of a path.
+PlainName = Annotated[str, AfterValidator(_plain)]
 
 
 class Section(BaseModel):

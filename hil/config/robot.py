@@ -9,11 +9,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
-from hil.config.base import Section, quantity
+from hil.config.base import PlainName, Section, quantity
 from hil.limits import board_table
-from hil.text import is_plain_name
 
 
 class MotorConfig(Section):
@@ -99,7 +98,7 @@ class BringUpConfig(Section):
 class RobotConfig(Section):
     """A four-wheel skid-steer robot, two driven wheels a side (control.md section 1)."""
 
-    name: str = Field(min_length=1, max_length=60, description="of the robot, for people")
+    name: PlainName = Field(min_length=1, max_length=60, description="of the robot, for people")
     variant: Literal["constrained", "slip", "lifted"] = Field(
         description="constrained: eta2 = -d0 theta_dot (2.31) and rolling wheels; slip: neither; "
         "lifted: on blocks, the wheels turn freely"
@@ -128,13 +127,6 @@ class RobotConfig(Section):
     battery: BatteryConfig
     floor: FloorConfig
     bring_up: BringUpConfig | None = Field(None, description="measured, for people to compare with")
-
-    @field_validator("name")
-    @classmethod
-    def _is_plain(cls, name: str) -> str:
-        if not is_plain_name(name):
-            raise ValueError("no / or \\, nothing that does not show")
-        return name
 
     @model_validator(mode="after")
     def _current_slow_enough(self) -> Self:

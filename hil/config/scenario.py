@@ -7,14 +7,13 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from hil.config.base import Section, quantity
+from hil.config.base import PlainName, Section, quantity
 from hil.config.camera import CameraConfig
 from hil.config.control import ControlConfig, ReferenceConfig
 from hil.config.events import Disturbance, Fault
 from hil.config.link import LinkConfig
 from hil.config.robot import RobotConfig
 from hil.core.errors import BadInput
-from hil.text import is_plain_name
 
 
 class StartPose(Section):
@@ -88,7 +87,7 @@ class SafetyConfig(Section):
 class Scenario(Section):
     """One experiment: the same tree runs on every target."""
 
-    name: str = Field(min_length=1, max_length=80, description="names the record's folder")
+    name: PlainName = Field(min_length=1, max_length=80, description="names the record's folder")
     description: str = Field("", description="one sentence for the reports")
     duration_s: float = quantity("s", "length of the controlled part", gt=0, le=3600)
     start: StartPose
@@ -111,10 +110,3 @@ class Scenario(Section):
     safety: SafetyConfig = SafetyConfig()
     disturbances: tuple[Disturbance, ...] = ()
     faults: tuple[Fault, ...] = ()
-
-    @field_validator("name")
-    @classmethod
-    def _names_a_folder(cls, name: str) -> str:
-        if not is_plain_name(name):
-            raise ValueError("names the folder of a record: no / or \\, nothing that does not show")
-        return name

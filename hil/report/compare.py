@@ -134,7 +134,7 @@ def _warnings(entries: Sequence[Entry]) -> list[str]:
 
 def _flaws(entry: Entry) -> list[str]:
     manifest = entry.run.manifest
-    flaws = list(entry.run.problems)
+    flaws = [*entry.run.problems, *manifest.notes]
     if manifest.outcome in {"fault", "interrupted"}:
         detail = f" ({manifest.outcome_detail})" if manifest.outcome_detail else ""
         flaws.append(f"the run ended by {manifest.outcome}{detail}: figures cover what there is")

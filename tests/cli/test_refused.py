@@ -186,3 +186,10 @@ def test_a_reference_longer_than_the_run_is_said(tmp_path: Path) -> None:
     assert "note: the reference takes" in run_pose(*short, "--out", tmp_path / "two").out
     plain = run_pose("--set", "duration_s=0.5", "--json", "--out", tmp_path / "three")
     assert plain.json["notes"] == []
+
+
+def test_the_name_of_a_campaign_is_no_path(tmp_path: Path) -> None:
+    """Results of a campaign stay where results go."""
+    file = tmp_path / "c.toml"
+    file.write_text('name = "../x"\nscenario = "scenario-1"\n', encoding="utf-8")
+    assert "name: names a folder" in hil("sweep", file).refusal
