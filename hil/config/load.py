@@ -20,6 +20,9 @@ from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
 from hil.limits import board_defaults, check_board
 
+# Values that would be laid aside: the command's own option (in a campaign, its list) decides them.
+_BY_OPTION = {"board.LAW": "--inner", "control.outer": "--outer"}
+
 Tree = dict[str, Any]
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -152,6 +155,8 @@ def set_value(tree: Tree, text: str) -> None:
 
 def put_value(tree: Tree, key: str, value: Any) -> None:
     """Put a value where the dotted name says, in place; an unknown one is a BadInput."""
+    if key in _BY_OPTION:
+        raise BadInput(f"--set {key}: an option decides it; use {_BY_OPTION[key]} (or its list)")
     parent, leaf = _find(tree, key)
     if parent is None:
         names = dotted_names(tree)

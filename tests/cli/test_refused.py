@@ -53,6 +53,8 @@ REFUSED = [
     ("board.OVER_W=10", "OVER_W = 10 rad/s"),
     ("board.BATT_LOW=12", "BATT_LOW = 12 V"),
     ("mismatch={wheel=1.1}", "mismatch.wheel"),
+    ("board.LAW=1", "--inner"),
+    ('control.outer="pid"', "--outer"),
     ("mismatch={d0_m=30.0}", "d0_m"),
 ]  # fmt: skip
 
