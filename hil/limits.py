@@ -66,7 +66,7 @@ def check_fit(scenario: Scenario) -> None:
     true_robot(scenario)  # the mismatch names numbers of the robot and keeps them in their bounds
     check_board(scenario.board)
     _check_counts(scenario, board)
-    _check_set_points(scenario, board)
+    _check_board_pairs(scenario, board)
     _check_battery(scenario, board)
 
 
@@ -87,11 +87,16 @@ def _check_counts(scenario: Scenario, board: Mapping[str, float]) -> None:
         )
 
 
-def _check_set_points(scenario: Scenario, board: Mapping[str, float]) -> None:
+def _check_board_pairs(scenario: Scenario, board: Mapping[str, float]) -> None:
     if board["W_MAX"] > board["OVER_W"]:
         raise BadInput(
             f"board.W_MAX = {board['W_MAX']:g} rad/s: must be at most OVER_W = {board['OVER_W']:g} "
             "rad/s, the wheel speed at which the board stops the robot"
+        )
+    if board["ST_VAR"] >= 1.0 and board["ST_LMIN"] > board["ST_L"]:
+        raise BadInput(
+            f"board.ST_LMIN = {board['ST_LMIN']:g} rad/s^2: must be at most ST_L = "
+            f"{board['ST_L']:g} rad/s^2, between which ST_VAR lets the gain vary"
         )
     rate_hz, timeout_ms = scenario.control.rate_hz, board["SP_TIMEOUT"]
     least_hz = 1e3 / (_PERIOD_SHARE * timeout_ms)

@@ -42,8 +42,7 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
     names. Raises BadInput.
     """
     tree = read_tree(name_or_path, "scenarios")
-    board = tree.get("board", {})
-    tree["board"] = board_defaults() | board if isinstance(board, dict) else board
+    _fill_board(tree)
     scenario = build(Scenario, tree, name_or_path)
     if overrides:
         return with_overrides(scenario, overrides)
@@ -58,9 +57,17 @@ def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
     tree = scenario.model_dump(mode="json")
     for text in overrides:
         set_value(tree, text)
+    _fill_board(tree)
     changed = build(Scenario, tree, "--set")
     check_board(changed.board)
     return changed
+
+
+def _fill_board(tree: Tree) -> None:
+    """Lay the board's table over the defaults, so that a run never depends on what a board had."""
+    board = tree.get("board", {})
+    if isinstance(board, dict):
+        tree["board"] = board_defaults() | board
 
 
 def read_tree(name_or_path: str, kind: str, above: tuple[str, ...] = ()) -> Tree:

@@ -172,7 +172,6 @@ def replay(
     Raises BadInput when the folder is no record, has nothing to replay, or a change makes no sense.
     """
     source = read_source(path)
-    _refuse_without_ticks(source)
     recorded = build(Scenario, source.manifest.scenario, str(path / layout.MANIFEST))
     scenario = _changed(recorded, overrides)
     law = outer or source.manifest.outer
@@ -194,6 +193,8 @@ def replay(
         ending = Ending("fault", str(fault))
     record = recorder.close(ending.outcome, ending.detail)
     samples = record.samples
+    if not samples["t_s"].size:
+        _refuse_without_ticks(source)
     if shadow is not None:
         samples = samples | shadow.columns(parts.geometry.wheels, samples["t_s"].size)
     stamps = [
@@ -218,7 +219,7 @@ def replay(
 
 def _refuse_without_ticks(source: Source) -> None:
     """Raise BadInput when the run ended before its first tick: there is nothing to reproduce."""
-    if source.samples and not source.samples["t_s"].size:
+    if not source.samples or not source.samples["t_s"].size:
         why = source.manifest.outcome_detail or source.manifest.outcome
         raise BadInput(
             f"{source.path}: has no tick: the run ended before its first one ({why}); nothing to "

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from hil.record.manifest import read_manifest, write_manifest
 from tests.cli.command import hil, run_pose
 
 REFUSED = [
@@ -52,6 +53,7 @@ REFUSED = [
     ("board.W_MAX=40", "OVER_W = 28 rad/s"),
     ("board.OVER_W=10", "OVER_W = 10 rad/s"),
     ("board.BATT_LOW=12", "BATT_LOW = 12 V"),
+    ('board={ST_VAR=1.0,ST_LMIN=300.0}', "ST_LMIN = 300 rad/s^2: must be at most ST_L = 200"),
     ("mismatch={wheel=1.1}", "mismatch.wheel"),
     ("board.LAW=1", "--inner"),
     ('control.outer="pid"', "--outer"),
@@ -167,6 +169,11 @@ def test_a_record_of_another_task_is_no_target(tmp_path: Path) -> None:
 def test_a_record_without_a_tick_is_not_replayed(tmp_path: Path) -> None:
     """Nothing is "reproduced bit for bit" where nothing was recorded."""
     run_pose("--set", "start.x_m=5", "--out", tmp_path / "run")
+    assert "no tick" in hil("replay", tmp_path / "run").refusal
+    manifest = read_manifest(tmp_path / "run").model_copy(update={"outcome": "running"})
+    write_manifest(tmp_path / "run", manifest)  # as after a loss of power
+    (tmp_path / "run" / "samples.parquet").unlink()
+    (tmp_path / "run" / "frames.parquet").unlink()
     assert "no tick" in hil("replay", tmp_path / "run").refusal
 
 

@@ -61,6 +61,12 @@ def test_set_reaches_scenario_robot_link_and_board_values() -> None:
     assert plain.robot.mass_kg != 3.1
 
 
+def test_a_whole_table_of_the_board_still_sets_every_parameter() -> None:
+    """What is not named has its default: a run does not depend on what the board had stored."""
+    table = load_scenario("scenario-1", ["board={ISM_K0=0.2}"])
+    assert table == load_scenario("scenario-1", ["board.ISM_K0=0.2"])
+
+
 def test_unknown_name_lists_near_names() -> None:
     """A mistyped name is answered with the name that was meant."""
     assert "robot.mass_kg" in refusal("scenario-1", "robot.mas_kg=3")
