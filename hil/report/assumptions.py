@@ -6,19 +6,15 @@ of the built-in robot, condition and scenario files. Neither is written down a s
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from typing import Any
 
 from hil.config.control import Gains
 from hil.config.fields import sections_in, told
 from hil.config.scenario import Scenario
+from hil.config.sources import file_sources
 
-_LINE = re.compile(r'^"?(?P<key>[\w.]+)"?\s*=\s*(?P<value>[^#]*?)\s*(?:#\s*(?P<note>.*))?$')
-_TABLE = re.compile(r"^\[(?P<table>[\w.]+)\]")
-_UNIT_FIRST = re.compile(r"^[^;:,]{1,12}; ")
 # Kept out of the table: the runs' subject and laws, shown elsewhere, and gain sets not in use.
 _ELSEWHERE = (
     "name", "description", "requirements", "control.gains", "control.outer", "board.LAW",
@@ -38,7 +34,7 @@ class Assumption:
 
 def assumptions(scenario: Mapping[str, Any]) -> list[tuple[str, list[Assumption]]]:
     """Return every value of a resolved scenario, grouped by its top table, in file order."""
-    sources = _sources(str(scenario.get("name", "")))
+    sources = file_sources(str(scenario.get("name", "")))
     groups: dict[str, list[Assumption]] = {}
     for key, value in _leaves(scenario):
         if key.startswith(_ELSEWHERE) or value is None:
@@ -76,26 +72,3 @@ def _leaves(tree: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
             yield from _leaves(item, f"{prefix}.{index}")
     elif not (isinstance(tree, Sequence) and not isinstance(tree, str) and not tree):
         yield prefix, tree
-
-
-def _sources(scenario_name: str) -> dict[str, str]:
-    """Return the comment beside each value of the built-in files, by dotted scenario key."""
-    data = files("hil") / "data"
-    found: dict[str, str] = {}
-    for folder, prefix in (("robots", "robot."), ("labs", ""), ("scenarios", "")):
-        for item in sorted((data / folder).iterdir(), key=lambda path: path.name):
-            wanted = folder != "scenarios" or item.name == f"{scenario_name}.toml"
-            if wanted and item.name.endswith(".toml"):
-                found |= _comments(item.read_text(encoding="utf-8"), prefix)
-    return found
-
-
-def _comments(text: str, prefix: str) -> dict[str, str]:
-    table, found = "", {}
-    for line in text.splitlines():
-        if header := _TABLE.match(line):
-            table = f"{header['table']}."
-        elif (entry := _LINE.match(line)) and entry["note"]:
-            # A comment begins with the unit, which the table of the report shows by itself.
-            found[f"{prefix}{table}{entry['key']}"] = _UNIT_FIRST.sub("", entry["note"])
-    return found

@@ -13,6 +13,7 @@ from hil.config.fields import Setting, settings, told
 from hil.config.load import load_robot, load_scenario, put_value
 from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
+from hil.config.sources import built_in_settings
 from hil.core.errors import BadInput
 from hil.limits import board_table
 from hil.report.assumptions import assumptions, gain_assumptions
@@ -141,3 +142,19 @@ def test_bounds_in_words() -> None:
         entry.minimum,
         entry.maximum,
     )
+
+
+def test_the_built_in_values_come_with_their_sources() -> None:
+    """A listing has value and source of every number of robot and gains, from the files themselves."""
+    listed = {(item.key, item.kind): item for item in built_in_settings()}
+    assert listed.keys() == ALL.keys()
+    radius = listed["robot.wheel_radius_m", ""]
+    assert (radius.default, radius.unit, radius.source) == (0.0482, "m", "table 8.3, r = 4.82 cm")
+    robot = [item for (key, _), item in listed.items() if key.startswith("robot.")]
+    missing = [item.key for item in robot if is_number(item) and not item.source]
+    assert [key for key in missing if "bring_up" not in key] == []
+    gains = [item for (key, _), item in listed.items() if ".asg_ism." in key or ".pid." in key]
+    assert len(gains) == 2 * (9 + 4)
+    assert all(isinstance(item.default, float) for item in gains)
+    thesis_k1 = listed["control.gains.thesis.asg_ism.k1_s", ""]
+    assert thesis_k1.source == "not printed; control.md section 2"
