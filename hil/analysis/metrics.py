@@ -4,12 +4,11 @@ Each figure is declared once in METRICS with its unit and with what is better. E
 are taken from the truth where the record has it, else from the estimate, and `basis` says which.
 Commands are held between ticks, so their integrals are step sums; errors are integrated by the
 trapezoidal rule. A figure that does not exist for a run (no sliding variable under PID, never
-settled) is NaN, null in JSON, and does not satisfy a requirement.
+settled, fewer than two ticks) is NaN, null in JSON, and does not satisfy a requirement.
 """
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from hil.core.errors import BadInput
+from hil.core.figures import BY_NAME, METRICS, require_known
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,85 +26,6 @@ if TYPE_CHECKING:
     Columns = Mapping[str, Array]
 
 LAST_S = 1.0  # "over the last second"
-Better = Literal["lower", "higher", "neither"]
-
-
-@dataclass(frozen=True, slots=True)
-class Metric:
-    """One figure: what it is called, its unit, how it is defined, and which way is better.
-
-    `shown` is the unit a person reads it in, and the factor from the figure's own unit to it.
-    """
-
-    name: str
-    unit: str
-    label: str
-    definition: str
-    better: Better = "lower"
-    shown: tuple[str, float] | None = None
-
-    @property
-    def shown_unit(self) -> str:
-        """Return the unit a person reads the figure in."""
-        return self.shown[0] if self.shown else self.unit
-
-    def text(self, value: float, *, with_unit: bool = True) -> str:
-        """Return a value as a person reads it: 3 digits, shown unit, a dash for NaN."""
-        if not math.isfinite(value):
-            return "–"
-        number = _three_digits(value * (self.shown[1] if self.shown else 1.0))
-        return f"{number} {self.shown_unit}".strip() if with_unit else number
-
-
-_MM, _MS, _PERCENT = ("mm", 1e3), ("ms", 1e3), ("%", 1e2)
-
-METRICS = (
-    Metric("delta1_final_m", "m", "final |δ1|", "|z1 - z1*| at the last tick", shown=_MM),
-    Metric("delta1_worst_last_second_m", "m", "worst |δ1|, last second",
-           "largest |z1 - z1*| over the last 1 s", shown=_MM),
-    Metric("ise_m2_s", "m²·s", "ISE", "integral of |δ1|²"),
-    Metric("iae_m_s", "m·s", "IAE", "integral of |δ1|"),
-    Metric("itae_m_s2", "m·s²", "ITAE", "integral of t |δ1|"),
-    Metric("settling_50mm_s", "s", "settling time to 50 mm", "|δ1| stays at or below 50 mm after"),
-    Metric("settling_20mm_s", "s", "settling time to 20 mm", "|δ1| stays at or below 20 mm after"),
-    Metric("path_length_m", "m", "path length", "length of the path of the centre of mass"),
-    Metric("control_energy_m2_s3", "m²/s³", "control energy ∫|u|²",
-           "integral of |u|², u = (zeta, u2): the inputs of the compensated model (2.33)"),
-    Metric("pwm_energy_counts2_s", "counts²·s", "PWM energy ∫PWM²",
-           "integral of PWM² of both sides, as sampled at each outer tick",
-           shown=("10⁶ counts²·s", 1e-6)),
-    Metric("eta1_variation_m_s", "m/s", "variation of speed command",
-           "sum of |change| of the forward speed commanded"),
-    Metric("theta_dot_variation_rad_s", "rad/s", "variation of turn command",
-           "sum of |change| of the turn rate commanded"),
-    Metric("pwm_variation_counts", "counts", "variation of PWM",
-           "sum of |change| of PWM of both sides, as sampled at each outer tick"),
-    Metric("s_sign_changes_hz", "1/s", "sign changes of s",
-           "sign changes of s_x and s_y together, per second"),
-    Metric("saturated_share", "", "time saturated", "share of ticks at which a limit held",
-           shown=_PERCENT),
-    Metric("in_layer_share", "", "time in the layer", "share of ticks with ||s|| <= eps",
-           "higher", shown=_PERCENT),
-    Metric("reaching_s", "s", "reaching time", "first time with ||s|| <= eps"),
-    Metric("link_loss_ratio", "", "link loss",
-           "board frames missing by sequence number / frames the board sent", shown=_PERCENT),
-    Metric("rtt_median_s", "s", "round trip, median",
-           "time exchange with the board, median", shown=_MS),
-    Metric("rtt_p99_s", "s", "round trip, 99 %",
-           "time exchange with the board, 99th percentile", shown=_MS),
-    Metric("exposure_to_actuation_median_s", "s", "exposure to actuation, median",
-           "from the middle of the exposure to the command's effect, median", shown=_MS),
-    Metric("exposure_to_actuation_p99_s", "s", "exposure to actuation, 99 %",
-           "from the middle of the exposure to the command's effect, 99th percentile", shown=_MS),
-    Metric("deadline_misses", "", "deadline misses", "ticks that began too late"),
-    Metric("start_offset_x_m", "m", "start offset in X",
-           "X of z1 - z1* at the first tick; negative: left of the point", "neither", shown=_MM),
-    Metric("turn_rad", "rad", "net turn",
-           "heading at the end - heading at the start; negative: to the right", "neither",
-           shown=("°", 180.0 / math.pi)),
-    Metric("duration_s", "s", "duration", "last tick - first tick", "neither"),
-)  # fmt: skip
-BY_NAME = {metric.name: metric for metric in METRICS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,9 +105,15 @@ def compute(columns: Columns, link: LinkStats | None = None) -> Figures:
     return Figures("truth" if true_error else "estimate", values)
 
 
+def no_figures(columns: Columns) -> Figures:
+    """Return the figures of a run that ended before its second tick: there is none."""
+    return Figures("truth" if has_truth(columns) else "estimate", dict.fromkeys(BY_NAME, math.nan))
+
+
 def has_truth(columns: Columns) -> bool:
     """Say whether the record knows the true state of the robot."""
-    return bool(np.isfinite(columns["true_delta1_x_m"]).all())
+    known = np.isfinite(columns["true_delta1_x_m"])
+    return bool(known.size and known.all())
 
 
 def error_norm(columns: Columns) -> Array:
@@ -297,14 +224,6 @@ def _percentile(values: Array, percent: float) -> float:
     return float(np.percentile(known, percent)) if known.size else math.nan
 
 
-def _three_digits(value: float) -> str:
-    """Return 3 significant digits without an exponent where a person would not write one."""
-    size = abs(value)
-    if size == 0 or float(f"{size:.3g}").is_integer():
-        return f"{value:,.0f}" if size < 1e9 else f"{value:.3g}"
-    return f"{value:.3g}" if 1e-3 <= size < 1e3 else f"{value:.2e}"
-
-
 def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
@@ -324,15 +243,6 @@ def _judge(figures: Figures, item: Mapping[str, Any]) -> Verdict:
     value = figures.values[name]
     holds = (low is None or value >= low) and (high is None or value <= high)
     return Verdict(name, value, BY_NAME[name].unit, low, high, holds and not math.isnan(value))
-
-
-def require_known(name: str) -> str:
-    """Return the name of a figure as it is; raises BadInput with near names when unknown."""
-    if name in BY_NAME:
-        return name
-    near = difflib.get_close_matches(name, BY_NAME, n=3, cutoff=0.4)
-    hint = f"near: {', '.join(near)}" if near else f"known: {', '.join(BY_NAME)}"
-    raise BadInput(f"requirement {name!r}: no such figure; {hint}")
 
 
 def all_hold(verdicts: Sequence[Verdict]) -> bool:

@@ -12,6 +12,7 @@ import click
 
 from hil.cli.options import json_option, print_json
 from hil.core.errors import BadInput
+from hil.core.text import visible
 
 if TYPE_CHECKING:
     from hil.config.robot import RobotConfig
@@ -67,7 +68,10 @@ def command(
         when = f"{datetime.now().astimezone():%Y-%m-%d %H:%M} on {target}"
         counts = believed.encoder_counts_per_turn
         written = write_robot_file(out, robot, counts, report.measured, when)
-        click.echo(f"{'written' if written else 'nothing measured, not written'}: {out}", err=True)
+        click.echo(
+            f"{'written' if written else 'nothing measured, not written'}: {visible(str(out))}",
+            err=True,
+        )
     return 0 if report.passed else 1
 
 
@@ -91,9 +95,9 @@ def _tell(check: Check) -> None:
     marks = {"ok": ("pass", "green"), "fail": ("FAIL", "red"), "note": ("note", "yellow"),
              "skipped": ("skip", "yellow")}  # fmt: skip
     word, colour = marks[check.state]
-    click.echo(f"{click.style(word, fg=colour)}  {check.name}: {check.text}", err=True)
+    click.echo(f"{click.style(word, fg=colour)}  {check.name}: {visible(check.text)}", err=True)
     if check.remedy:
-        click.echo(f"      -> {check.remedy}", err=True)
+        click.echo(f"      -> {visible(check.remedy)}", err=True)
 
 
 def _summary(report: Report) -> str:

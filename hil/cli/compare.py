@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hil.cli.options import json_option, print_json
+from hil.core.text import visible
 
 if TYPE_CHECKING:
     from hil.study.experiment import Study
@@ -28,7 +29,7 @@ def command(
     csv_file: Path | None,
     rerun: Path | None,
     as_json: bool,
-) -> None:
+) -> int:
     """Compare two or more run records of one scenario.
 
     Runs of two or more seeds per law, the same ones for each, are also compared as repeats: paired
@@ -38,6 +39,7 @@ def command(
     from hil.record.reader import read_run
     from hil.report.csv_table import write_csv
     from hil.report.html import write_report
+    from hil.runs.execute import judged_status
     from hil.study.experiment import study
 
     records = [read_run(run) for run in runs]
@@ -53,15 +55,17 @@ def command(
         write_rrd(rerun, records)
     if as_json:
         print_json(found.to_json())
-        return
+        return judged_status(records)
     print_study(found)
     if report is not None:
-        click.echo(f"report: {report}")
+        click.echo(f"report: {visible(str(report))}")
+    return judged_status(records)
 
 
 def print_study(study: Study) -> None:
     """Write the table of a scenario, its warnings and findings, and its statistics to stdout."""
     from rich.console import Console
+    from rich.markup import escape
 
     from hil.report.compare import HEADLINES, findings, text_table
     from hil.report.repeats import text_tables
@@ -70,16 +74,18 @@ def print_study(study: Study) -> None:
     comparison, repeats = study.comparison, study.repeats
     console.print(text_table(comparison))
     for line in comparison.warnings:
-        console.print(f"[yellow]note:[/yellow] {line}")
+        console.print(f"[yellow]note:[/yellow] {escape(visible(line))}")
     if repeats is None:
         for line in findings(comparison):
-            console.print(f"- {line}")
+            console.print(f"- {escape(visible(line))}")
     else:
         console.print(f"Above: seed {repeats.seeds[0]} alone. All {len(repeats.seeds)} seeds:")
         for arm, count in repeats.complete.items():
-            console.print(f"- {arm}: {count} of {len(repeats.seeds)} runs met every requirement")
+            console.print(
+                f"- {escape(visible(arm))}: {count} of {len(repeats.seeds)} runs met every requirement"
+            )
         for line in repeats.warnings:
-            console.print(f"[yellow]note:[/yellow] {line}")
+            console.print(f"[yellow]note:[/yellow] {escape(visible(line))}")
         for table in text_tables(repeats, list(HEADLINES)):
             console.print(table)
     console.print()

@@ -18,6 +18,7 @@ from hil.cli.options import (
     target_option,
 )
 from hil.cli.progress import run_progress
+from hil.core.text import visible
 
 
 @click.command("experiment")
@@ -89,5 +90,5 @@ def command(
     else:
         for item in studies:
             print_study(item)
-        click.echo(f"report: {report}")
+        click.echo(f"report: {visible(str(report))}")
     return max(exit_status(record) for record in records)

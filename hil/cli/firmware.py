@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from hil.core.errors import BadInput
+from hil.core.text import visible
 
 _FILE = click.Path(path_type=Path, dir_okay=False)
 _port_option = click.option(
@@ -29,7 +30,7 @@ def build(out: Path | None, fresh: bool) -> int:
     from hil.board import build
 
     made = build.build(out, fresh=fresh)
-    click.echo(f"build {made.build_id}: {made.elf} and {made.hex.name}")
+    click.echo(f"build {made.build_id}: {visible(str(made.elf))} and {made.hex.name}")
     click.echo(f"flash {made.flash_bytes} bytes, static RAM {made.ram_bytes} bytes")
     for line in made.over_budget():
         click.echo(f"over budget: {line}")
@@ -59,7 +60,7 @@ def codegen(check: bool) -> int:
             click.echo(line)
         return 1 if stale else 0
     for path in generator.write():
-        click.echo(f"written: {path}")
+        click.echo(f"written: {visible(str(path))}")
     return 0
 
 
@@ -98,7 +99,7 @@ def list_parameters(target: str) -> None:
 @click.option("--store", is_flag=True, help="Keep them in the EEPROM as well.")
 def set_parameters(target: str, settings: tuple[str, ...], store: bool) -> None:
     """Set parameters within their bounds; all are checked before the first is sent."""
-    from hil.config.load import check_board
+    from hil.config.limits import check_board
     from hil.tools.board_parameters import open_board
 
     values: dict[str, float] = {}
@@ -125,7 +126,7 @@ def save_parameters(target: str, file: Path) -> None:
 
     with open_board(target) as board:
         write_file(file, board.parameters)
-    click.echo(f"written: {file}")
+    click.echo(f"written: {visible(str(file))}")
 
 
 @params.command("compare")

@@ -16,14 +16,15 @@ from hil.cli.run import print_summary, summary
               help="What the log is of, and where each column comes from (docs/run-record.md).")  # fmt: skip
 @out_option
 @json_option
-def command(log: Path, mapping: Path | None, out: Path | None, as_json: bool) -> None:
+def command(log: Path, mapping: Path | None, out: Path | None, as_json: bool) -> int:
     """Make a run record of LOG, a MAVLink .tlog or a CSV file, that compare and view accept."""
     from hil.record.log_import import import_log
     from hil.record.manifest import command_line
-    from hil.runs.execute import new_folder
+    from hil.runs.execute import judged_status, new_folder
 
     record = import_log(log, mapping, out or new_folder(log.stem), command_line())
     if as_json:
         print_json(summary(record))
     else:
         print_summary(record)
+    return judged_status([record])

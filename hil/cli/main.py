@@ -11,6 +11,7 @@ import click
 
 from hil import __version__
 from hil.core.errors import HilError
+from hil.core.text import visible
 
 # name -> (module, one-line help). The text stands here so that `hil --help` imports no command.
 COMMANDS = {
@@ -79,10 +80,10 @@ def main() -> NoReturn:
         click.echo(error.format_message(), err=True)
         sys.exit(2)
     except click.ClickException as error:
-        click.echo(f"hil: {' '.join(error.format_message().split())}", err=True)
+        click.echo(f"hil: {visible(' '.join(error.format_message().split()))}", err=True)
         sys.exit(error.exit_code if isinstance(error, click.UsageError) else 2)
     except HilError as error:
-        click.echo(f"hil: {error}", err=True)
+        click.echo(f"hil: {visible(str(error))}", err=True)
         sys.exit(error.exit_status)
     except (click.Abort, KeyboardInterrupt):
         click.echo("hil: stopped by Ctrl-C", err=True)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -44,6 +47,13 @@ out_option = click.option(
 )  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True,
                            help="One JSON document on stdout, nothing else.")  # fmt: skip
+
+
+def plain_console() -> Console:
+    """Return a console for stdout that shows text as it is typed: no markup, no highlighting."""
+    from rich.console import Console
+
+    return Console(highlight=False, soft_wrap=True, markup=False)
 
 
 def print_json(document: dict[str, Any]) -> None:

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from hil.core.text import visible
+
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
@@ -21,13 +23,15 @@ def run_progress(durations_s: Mapping[str, float]) -> Iterator[Update]:
 
     console = Console(stderr=True)
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         TextColumn("{task.completed:5.1f}/{task.total:.0f} s simulated"),
         TimeElapsedColumn(),
     )
     with Progress(*columns, console=console, disable=not console.is_terminal) as bars:
-        tasks = {name: bars.add_task(name, total=total) for name, total in durations_s.items()}
+        tasks = {
+            name: bars.add_task(visible(name), total=total) for name, total in durations_s.items()
+        }
         yield lambda name, t_s: bars.update(tasks[name], completed=t_s)
 
 
@@ -45,7 +49,7 @@ def _job_bars() -> Progress:
 
     console = Console(stderr=True)
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
@@ -58,7 +62,7 @@ def _job_bars() -> Progress:
 def job_progress(name: str) -> Iterator[Callable[[int, int], None]]:
     """Show one bar for many jobs; `update(done, total)` moves it."""
     with _job_bars() as bars:
-        task = bars.add_task(name, total=None)
+        task = bars.add_task(visible(name), total=None)
         yield lambda done, total: bars.update(task, completed=done, total=total)
 
 

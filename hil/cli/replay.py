@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hil.cli.options import INNER_LAWS, json_option, print_json, set_option
+from hil.cli.options import INNER_LAWS, json_option, plain_console, print_json, set_option
+from hil.core.text import visible
 
 if TYPE_CHECKING:
     from hil.replays.exact import ReplayReport
@@ -46,7 +47,8 @@ def command(
     Without options the replay is exact: it must give the recorded commands bit for bit (exit
     status 0), or the first difference of each channel is reported (1). With --outer or --set it is
     a shadow: what that law would have commanded in each recorded state. The robot did not follow
-    the shadow, so this is open loop and no verdict on the other law.
+    the shadow, so this is open loop and no verdict on the other law. A shadow that its own limits
+    stop before the record's last tick ends with status 3.
 
     --firmware, --inner or a --set of a board parameter sends the recorded set-points and encoder
     counts through the firmware core and compares its PWM with the recorded one; with --elf through
@@ -91,17 +93,23 @@ def command(
             click.echo(wheels.text())
         if answer is not None:
             click.echo(answer.text())
-    return 0 if report.kind == "shadow" or report.identical else 1
+    return _status(report)
+
+
+def _status(report: ReplayReport) -> int:
+    """Return 0; 1 for an exact replay that differs, 3 for a shadow that was stopped on its way."""
+    if report.kind == "exact":
+        return 0 if report.identical else 1
+    stopped = report.ending.outcome == "fault" and report.ticks_replayed < report.ticks_recorded
+    return 3 if stopped and not report.cut_off else 0
 
 
 def print_report(report: ReplayReport) -> None:
     """Write the verdict and every channel that differs to stdout."""
-    from rich.console import Console
-
-    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console = plain_console()
     for problem in report.problems:
-        console.print(f"note: {problem}")
-    console.print(headline(report))
+        console.print(f"note: {visible(problem)}")
+    console.print(visible(headline(report)))
     different = [channel for channel in report.channels if not channel.same]
     if not different:
         return
@@ -119,6 +127,9 @@ def headline(report: ReplayReport) -> str:
     """Return the answer in one sentence."""
     covered = f"{report.ticks_replayed} of {report.ticks_recorded} ticks, from {report.seen_by}"
     if report.kind == "shadow":
+        ending = report.ending
+        short = ending.outcome == "fault" and report.ticks_replayed < report.ticks_recorded
+        covered += f"; stopped there: {ending.detail}" if short else ""
         changed = "".join(f", {change}" for change in report.changes)
         return (
             f"shadow of {report.law}{changed} (open loop: the robot followed the recorded "

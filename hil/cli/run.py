@@ -16,12 +16,14 @@ from hil.cli.options import (
     json_option,
     out_option,
     outer_option,
+    plain_console,
     print_json,
     seed_option,
     set_option,
     target_option,
 )
 from hil.cli.progress import run_progress
+from hil.core.text import visible
 
 if TYPE_CHECKING:
     from hil.record.reader import RunRecord
@@ -93,7 +95,7 @@ def command(
     if view:
         from hil.record.viewer import open_viewer
 
-        click.echo(open_viewer([record.path]), err=True)
+        click.echo(visible(open_viewer([record.path])), err=True)
     return exit_status(record)
 
 
@@ -124,6 +126,7 @@ def summary(record: RunRecord) -> dict[str, Any]:
         "seed": manifest.seed,
         "outcome": manifest.outcome,
         "detail": manifest.outcome_detail,
+        "notes": list(manifest.notes),
         "requirements": [
             {"text": item.text(), "value": _finite(item.value), "holds": item.holds}
             for item in record.verdicts()
@@ -138,16 +141,26 @@ def _finite(value: float) -> float | None:
 
 def print_summary(record: RunRecord) -> None:
     """Write outcome, requirements and the place of the record to stdout."""
-    from rich.console import Console
+    from rich.text import Text
 
-    console = Console(highlight=False, soft_wrap=True)
+    console = plain_console()
     manifest = record.manifest
-    console.print(
+    line = (
         f"{manifest.scenario_name} on {manifest.target}, outer {manifest.outer}, "
         f"inner {manifest.inner}, seed {manifest.seed}: {manifest.outcome}"
-        + (f" - {manifest.outcome_detail}" if manifest.outcome_detail else "")
     )
+    console.print(visible(line + said(manifest.outcome_detail)))
     for item in record.verdicts():
-        mark = "[green]holds[/green]" if item.holds else "[red]FAILS[/red]"
-        console.print(f"  {mark}  {item.text()}   (is {item.value:.4g})")
-    console.print(f"record: {record.path}")
+        mark = ("holds", "green") if item.holds else ("FAILS", "red")
+        is_now = (
+            f"is {item.value:.4g}" if math.isfinite(item.value) else "no such value in this run"
+        )
+        console.print(Text.assemble("  ", mark, f"  {item.text()}   ({is_now})"))
+    for note in manifest.notes:
+        console.print(Text.assemble(("note:", "yellow"), f" {visible(note)}"))
+    console.print(f"record: {visible(str(record.path))}")
+
+
+def said(detail: str) -> str:
+    """Return what follows an outcome: its detail, if there is one."""
+    return f" - {detail}" if detail else ""

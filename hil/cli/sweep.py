@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from hil.cli.options import json_option, print_json
+from hil.core.text import visible
 
 
 @click.command("sweep")
@@ -26,6 +27,9 @@ def command(
 
     Every combination of the values in [grid] and [[together]], `draws` draws of [random], `seeds`
     seeds and all laws; runs are kept in memory, one row each goes to results.parquet.
+
+    Exit status: 0 when every run met its requirements, 1 when one did not, 3 when one ended early
+    by a fault (outside the fence, robot not seen, board stopped).
     """
     from hil.cli.progress import job_progress
     from hil.record.manifest import command_line
@@ -39,6 +43,9 @@ def command(
     folder = out or new_folder(f"sweep-{campaign.file.name}")
     with job_progress(campaign.file.name) as update:
         table, totals = run_campaign(campaign, folder, workers, dask, update)
+    ended, kept = table["outcome"].to_pylist(), table["holds"].to_pylist()
+    held, early = sum(kept), sum(outcome != "complete" for outcome in ended)
+    status = 3 if "fault" in ended else int(held < len(kept))
     outcomes = outcomes_of(campaign, table)
     page = folder / "report.html"
     write_page(page, outcomes, command_line())
@@ -50,6 +57,8 @@ def command(
         "report": str(page),
         "runs": totals.runs,
         "runs_now": totals.runs_now,
+        "requirements_hold": held,
+        "ended_early": early,
         "wall_s": round(totals.wall_s, 3),
         "workers": totals.workers,
         "parallel_efficiency": round(efficiency, 4) if efficiency is not None else None,
@@ -57,10 +66,11 @@ def command(
     }
     if as_json:
         print_json(document)
-        return 0
+        return status
     told = f", {efficiency:.0%} of the workers' time spent on runs" if efficiency else ""
     click.echo(f"{totals.runs} runs, {totals.runs_now} of them now in {totals.wall_s:.1f} s{told}")
+    click.echo(f"{held} of {totals.runs} runs met every requirement, {early} ended early")
     for line in sentences(outcomes):
-        click.echo(f"- {line}")
-    click.echo(f"results: {document['results']}\nreport: {page}")
-    return 0
+        click.echo(f"- {visible(line)}")
+    click.echo(f"results: {visible(document['results'])}\nreport: {visible(str(page))}")
+    return status

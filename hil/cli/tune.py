@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING
 import click
 
 from hil.cli.options import json_option, print_json
+from hil.core.text import visible
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from hil.analysis.metrics import Metric
     from hil.analysis.stats import Paired
     from hil.cli.progress import Stage
     from hil.config.gains import Gains
+    from hil.core.figures import Metric
     from hil.study.tune import Figures, Trial
     from hil.study.tuning_verdict import Verdict
 
@@ -111,14 +112,14 @@ def _print(out: Path, gains: Gains, verdict: Verdict) -> None:
     for law, count in verdict.failed.items():
         if count:
             console.print(f"[yellow]note:[/yellow] {law}: {count} runs failed")
-    console.print(f"gain set: {out}")
+    click.echo(f"gain set: {visible(str(out))}")
 
 
 def _table(verdict: Verdict) -> Table:
     """Return the paired differences, a row per figure and a column per scenario."""
     from rich.table import Table
 
-    from hil.analysis.metrics import BY_NAME
+    from hil.core.figures import BY_NAME
     from hil.study.tuning_verdict import ALL_SCENARIOS
 
     seeds = f"seeds {verdict.seeds[0]} to {verdict.seeds[-1]}"

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from hil.core.text import visible
+
 
 @click.command("view")
 @click.argument("runs", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RUN...")
@@ -13,4 +15,4 @@ def command(runs: tuple[Path, ...]) -> None:
     """Open one or several run records in the viewer, on a common timeline."""
     from hil.record.viewer import open_viewer
 
-    click.echo(open_viewer(list(runs)), err=True)
+    click.echo(visible(open_viewer(list(runs))), err=True)

@@ -4,22 +4,36 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 from pydantic import (
     AfterValidator,
     BaseModel,
     ConfigDict,
+    Field,
+    JsonValue,
     ModelWrapValidatorHandler,
     model_validator,
-)  # fmt: skip
+)
+from pydantic.fields import FieldInfo
 
 from hil.core.errors import BadInput
 from hil.core.registry import Registry
+from hil.core.text import is_plain_name
+
+
+def _plain(name: str) -> str:
+    if not is_plain_name(name):
+        raise ValueError("names a folder: no / or \\, and nothing that does not show")
+    return name
+
+
+# A name that becomes part of a path.
+PlainName = Annotated[str, AfterValidator(_plain)]
 
 
 class Section(BaseModel):
-    """One table of a TOML file; bounds stand on the fields, units in their names."""
+    """One table of a TOML file; bounds, unit and meaning of each number stand on its field."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -34,6 +48,29 @@ class Section(BaseModel):
                     raise ValueError(f"unknown key {key!r}; near: {', '.join(near or known)}")
         return tree
 
+    @classmethod
+    def unit_of(cls, name: str, table: Mapping[str, Any]) -> str:  # noqa: ARG003 - of the whole table
+        """Return the unit of a value; a section in which another value decides it says so here."""
+        return str(extra_of(cls.model_fields[name]).get("unit", ""))
+
+
+def extra_of(field: FieldInfo) -> Mapping[str, Any]:
+    """Return what `quantity` keeps with a field: `unit` and `source`; empty for other fields."""
+    extra = field.json_schema_extra
+    return extra if isinstance(extra, Mapping) else {}
+
+
+def quantity(
+    unit: str, description: str, default: Any = ..., /, *, source: str = "", **bounds: Any
+) -> Any:
+    """Return a number's field: its unit, what it is and its bounds, as data.
+
+    `unit` is "" for a plain number and "(ratio)" for a share; `source` says where the default comes
+    from. `bounds` are pydantic's (ge, gt, le, lt, min_length, ...).
+    """
+    extra: dict[str, JsonValue] = {"unit": unit, "source": source}
+    return Field(default, description=description, json_schema_extra=extra, **bounds)
+
 
 class OpenSection(Section):
     """A table whose model depends on what is registered: laws' gains, a reference of some kind."""
@@ -41,6 +78,11 @@ class OpenSection(Section):
     @classmethod
     def model_for(cls, tree: Any) -> type[BaseModel]:
         """Return the model of a table as it stands; raises BadInput for an unknown kind."""
+        raise NotImplementedError
+
+    @classmethod
+    def models(cls) -> list[type[BaseModel]]:
+        """Return every model that a table may take now."""
         raise NotImplementedError
 
     @model_validator(mode="wrap")

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from hil.config.base import Section, known_name
+from hil.config.base import Section, known_name, quantity
 from hil.core.registries import LOCALISERS
 
 Reflectance = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -23,24 +23,32 @@ Vec3 = tuple[float, float, float]
 class LensConfig(Section):
     """Intrinsics at a reference width; other resolutions scale by width and crop rows evenly."""
 
-    at_width_px: int = Field(640, ge=16, description="px, width the figures below belong to")
-    at_height_px: int = Field(480, ge=16, description="px, height the figures below belong to")
-    fx_px: float = Field(
-        620.0, gt=10.0, description="px, 54 deg across: an ordinary webcam cropped to 4:3, assumed"
+    at_width_px: int = quantity("px", "width the figures below belong to", 640, ge=16)
+    at_height_px: int = quantity("px", "height the figures below belong to", 480, ge=16)
+    fx_px: float = quantity(
+        "px", "54 deg across", 620.0, gt=10.0, source="assumed: an ordinary webcam cropped to 4:3"
     )
-    fy_px: float = Field(620.0, gt=10.0, description="px, square pixels")
-    cx_px: float = Field(323.4, description="px, a few px off the middle (319.5) as lenses are")
-    cy_px: float = Field(236.8, description="px, a few px off the middle (239.5) as lenses are")
-    k1: float = Field(-0.16, ge=-1.0, le=1.0, description="barrel, half that of OpenCV's samples")
-    k2: float = Field(0.04, ge=-2.0, le=2.0, description="assumed, keeps the map monotonic")
-    p1: float = Field(0.0008, ge=-0.1, le=0.1, description="decentring, of the usual size")
-    p2: float = Field(-0.0005, ge=-0.1, le=0.1, description="decentring, of the usual size")
-    k3: float = Field(0.0, ge=-2.0, le=2.0, description="not needed below 60 deg")
-    shift_degree: int = Field(
-        0, ge=0, le=7, description="of the pixel correction by `hil calibrate floor --correct`"
+    fy_px: float = quantity("px", "square pixels", 620.0, gt=10.0)
+    cx_px: float = quantity("px", "a few px off the middle (319.5) as lenses are", 323.4)
+    cy_px: float = quantity("px", "a few px off the middle (239.5) as lenses are", 236.8)
+    k1: float = quantity(
+        "", "barrel", -0.16, ge=-1.0, le=1.0, source="half that of OpenCV's samples"
     )
-    shift_u: tuple[float, ...] = Field((), description="its terms in half widths, for u")
-    shift_v: tuple[float, ...] = Field((), description="its terms in half widths, for v")
+    k2: float = quantity(
+        "", "radial, 4th order", 0.04, ge=-2.0, le=2.0, source="assumed: keeps the map monotonic"
+    )
+    p1: float = quantity(
+        "", "decentring", 0.0008, ge=-0.1, le=0.1, source="assumed: of the usual size"
+    )
+    p2: float = quantity(
+        "", "decentring", -0.0005, ge=-0.1, le=0.1, source="assumed: of the usual size"
+    )
+    k3: float = quantity("", "not needed below 60 deg", 0.0, ge=-2.0, le=2.0)
+    shift_degree: int = quantity(
+        "", "of the pixel correction by `hil calibrate floor --correct`", 0, ge=0, le=7
+    )
+    shift_u: tuple[float, ...] = quantity("half widths", "its terms in half widths, for u", ())
+    shift_v: tuple[float, ...] = quantity("half widths", "its terms in half widths, for v", ())
 
     @model_validator(mode="after")
     def _check_shift(self) -> LensConfig:
@@ -58,14 +66,15 @@ class LensConfig(Section):
 class CameraPoseConfig(Section):
     """Where the camera hangs: eye and look-at point, or a measured rotation in their place."""
 
-    eye_m: Vec3 = Field(
+    eye_m: Vec3 = quantity(
+        "m",
+        "world: a boom under the ceiling, 19 deg off vertical; 2.0 m x 1.5 m of "
+        "floor and the marks above it stay in view with some 5 % to spare",
         (0.0, -0.75, 2.15),
-        description="m, world: a boom under the ceiling, 19 deg off vertical; 2.0 m x 1.5 m of"
-        " floor and the marks above it stay in view with some 5 % to spare",
     )
-    target_m: Vec3 = Field((0.0, 0.03, 0.0), description="m, world point in the image centre")
-    R_world_cam: tuple[Vec3, Vec3, Vec3] | None = Field(
-        None, description="measured rotation, camera to world; overrides target_m"
+    target_m: Vec3 = quantity("m", "world point in the image centre", (0.0, 0.03, 0.0))
+    R_world_cam: tuple[Vec3, Vec3, Vec3] | None = quantity(
+        "", "measured rotation, camera to world; overrides target_m", None
     )
 
     @model_validator(mode="after")
@@ -89,11 +98,9 @@ class CameraPoseConfig(Section):
 class MarkConfig(Section):
     """One round colour mark on the robot's plate."""
 
-    colour: Colour = Field(description="reflectance (b, g, r)")
-    x_m: float = Field(ge=-1.0, le=1.0, description="m, body frame, forward of the centre of mass")
-    y_m: float = Field(
-        0.0, ge=-1.0, le=1.0, description="m, body frame, left of the centre of mass"
-    )
+    colour: Colour = quantity("(ratio)", "reflectance (b, g, r)")
+    x_m: float = quantity("m", "body frame, forward of the centre of mass", ge=-1.0, le=1.0)
+    y_m: float = quantity("m", "body frame, left of the centre of mass", 0.0, ge=-1.0, le=1.0)
 
 
 class MarksConfig(Section):
@@ -105,21 +112,20 @@ class MarksConfig(Section):
     rear: MarkConfig = Field(
         MarkConfig(colour=(0.12, 0.42, 0.08), x_m=-0.08), description="matt green paper, rear"
     )
-    diameter_m: float = Field(
-        0.06, ge=0.005, le=0.5, description="m, 16 px at 640 px: edge enough for 0.01 px of noise"
+    diameter_m: float = quantity(
+        "m", "16 px at 640 px: edge enough for 0.01 px of noise", 0.06, ge=0.005, le=0.5
     )
-    height_m: float = Field(
-        0.10,
-        ge=0.0,
-        le=1.0,
-        description="m over the floor: top of the wheels (2 r = 96 mm) + plate",
+    height_m: float = quantity(
+        "m", "over the floor: top of the wheels (2 r = 96 mm) + plate", 0.10, ge=0.0, le=1.0
     )
-    ground_ratio_max: float = Field(
+    ground_ratio_max: float = quantity(
+        "(ratio)",
+        "brightness of the ground about a mark over its own, at most: on a dark "
+        "plate 0.25, in a lamp's reflection 0.7; coloured things on the floor "
+        "have 1.5 and more",
         0.85,
         gt=0.0,
         le=100.0,
-        description="brightness of the ground about a mark over its own, at most: on a dark plate"
-        " 0.25, in a lamp's reflection 0.7; coloured things on the floor have 1.5 and more",
     )
     swapped_marks: bool = Field(
         False, description="fault: colours changed over on the robot, the host not told"
@@ -130,29 +136,44 @@ class TagConfig(Section):
     """An ArUco tag on the plate between the marks, x axis of the tag along body x."""
 
     dictionary: str = Field("DICT_4X4_50", description="name of the OpenCV dictionary")
-    tag_id: int = Field(7, ge=0, description="id in the dictionary")
-    size_m: float = Field(0.07, gt=0.0, le=0.5, description="m, black edge to black edge")
-    margin_ratio: float = Field(0.15, ge=0.0, le=1.0, description="white border over size")
-    x_m: float = Field(0.0, ge=-1.0, le=1.0, description="m, body frame")
-    y_m: float = Field(0.0, ge=-1.0, le=1.0, description="m, body frame")
+    tag_id: int = quantity("", "id in the dictionary", 7, ge=0)
+    size_m: float = quantity("m", "black edge to black edge", 0.07, gt=0.0, le=0.5)
+    margin_ratio: float = quantity("(ratio)", "white border over size", 0.15, ge=0.0, le=1.0)
+    x_m: float = quantity("m", "body frame", 0.0, ge=-1.0, le=1.0)
+    y_m: float = quantity("m", "body frame", 0.0, ge=-1.0, le=1.0)
 
 
 class RobotLookConfig(Section):
     """What the camera sees of the robot besides its marks (twin only)."""
 
-    plate_length_m: float = Field(0.26, gt=0.0, le=1.0, description="m, covers both wheels' length")
-    plate_width_m: float = Field(0.16, gt=0.0, le=1.0, description="m, between the wheels")
-    body_bottom_m: float = Field(0.03, ge=0.0, le=1.0, description="m, ground clearance, assumed")
-    wheel_radius_m: float = Field(0.0482, gt=0.0, le=0.5, description="m, thesis table 8.3")
-    wheel_width_m: float = Field(0.042, gt=0.0, le=0.5, description="m, common toy wheel, assumed")
-    track_m: float = Field(0.2166, gt=0.0, le=1.0, description="m, thesis table 8.3")
-    wheelbase_m: float = Field(0.15, gt=0.0, le=1.0, description="m, thesis table 8.3, length a")
-    plate_colour: Colour = Field((0.05, 0.05, 0.05), description="matt black, as a marks' ground")
-    side_colour: Colour = Field((0.09, 0.09, 0.10), description="black in its own shade")
-    tyre_colour: Colour = Field((0.06, 0.06, 0.07), description="rubber")
-    hub_colour: Colour = Field((0.10, 0.45, 0.55), description="yellow plastic")
-    board_colour: Colour = Field((0.30, 0.26, 0.04), description="teal circuit board, Mega 2560")
-    board_size_m: Vec2 = Field((0.0533, 0.1016), description="m, body x and y: a Mega 2560 across")
+    plate_length_m: float = quantity("m", "covers both wheels' length", 0.26, gt=0.0, le=1.0)
+    plate_width_m: float = quantity("m", "between the wheels", 0.16, gt=0.0, le=1.0)
+    body_bottom_m: float = quantity("m", "ground clearance", 0.03, ge=0.0, le=1.0, source="assumed")
+    wheel_radius_m: float = quantity(
+        "m", "radius of a wheel", 0.0482, gt=0.0, le=0.5, source="thesis table 8.3"
+    )
+    wheel_width_m: float = quantity(
+        "m", "width of a wheel", 0.042, gt=0.0, le=0.5, source="assumed: a common toy wheel"
+    )
+    track_m: float = quantity(
+        "m", "distance of left and right wheels", 0.2166, gt=0.0, le=1.0, source="thesis table 8.3"
+    )
+    wheelbase_m: float = quantity(
+        "m",
+        "distance of front and rear wheels",
+        0.15,
+        gt=0.0,
+        le=1.0,
+        source="thesis table 8.3, length a",
+    )
+    plate_colour: Colour = quantity("(ratio)", "matt black, as a marks' ground", (0.05, 0.05, 0.05))
+    side_colour: Colour = quantity("(ratio)", "black in its own shade", (0.09, 0.09, 0.10))
+    tyre_colour: Colour = quantity("(ratio)", "rubber", (0.06, 0.06, 0.07))
+    hub_colour: Colour = quantity("(ratio)", "yellow plastic", (0.10, 0.45, 0.55))
+    board_colour: Colour = quantity("(ratio)", "teal circuit board, Mega 2560", (0.30, 0.26, 0.04))
+    board_size_m: Vec2 = quantity(
+        "m", "body x and y", (0.0533, 0.1016), source="a Mega 2560 across"
+    )
     tag: TagConfig | None = Field(None, description="ArUco tag in the circuit board's place")
 
 
@@ -162,73 +183,72 @@ class ClutterConfig(Section):
     shape: Literal["disc", "box"] = Field(
         "disc", description="disc is flat, box stands on the floor"
     )
-    x_m: float = Field(description="m, world")
-    y_m: float = Field(description="m, world")
-    size_m: Vec2 = Field((0.06, 0.06), description="m, disc: diameter twice; box: along its x, y")
-    height_m: float = Field(0.0, ge=0.0, le=1.5, description="m, of its upper face")
-    theta_rad: float = Field(0.0, description="rad, turn of a box about z")
-    colour: Colour = Field(description="reflectance (b, g, r)")
+    x_m: float = quantity("m", "world")
+    y_m: float = quantity("m", "world")
+    size_m: Vec2 = quantity("m", "disc: diameter twice; box: along its x, y", (0.06, 0.06))
+    height_m: float = quantity("m", "of its upper face", 0.0, ge=0.0, le=1.5)
+    theta_rad: float = quantity("rad", "turn of a box about z", 0.0)
+    colour: Colour = quantity("(ratio)", "reflectance (b, g, r)")
 
 
 class BarConfig(Section):
     """A straight cable or rod over the robot that covers what lies below it."""
 
     frame: Literal["world", "body"] = Field("world", description="body: rides on the robot")
-    start_m: Vec2 = Field(description="m, one end")
-    end_m: Vec2 = Field(description="m, other end")
-    width_m: float = Field(0.008, gt=0.0, le=0.5, description="m, a power cable")
-    height_m: float = Field(0.25, ge=0.0, le=1.5, description="m over the floor")
-    colour: Colour = Field((0.10, 0.10, 0.11), description="reflectance (b, g, r)")
+    start_m: Vec2 = quantity("m", "one end")
+    end_m: Vec2 = quantity("m", "other end")
+    width_m: float = quantity("m", "a power cable", 0.008, gt=0.0, le=0.5)
+    height_m: float = quantity("m", "over the floor", 0.25, ge=0.0, le=1.5)
+    colour: Colour = quantity("(ratio)", "reflectance (b, g, r)", (0.10, 0.10, 0.11))
 
 
 class ShadowEdgeConfig(Section):
     """A straight shadow edge on floor and robot, as from a window frame or a cupboard."""
 
-    through_m: Vec2 = Field((0.0, 0.0), description="m, world point on the edge")
-    azimuth_rad: float = Field(0.6, description="rad, direction of the edge; shade is on its left")
-    depth_ratio: float = Field(0.45, ge=0.0, le=1.0, description="share of the light taken away")
-    softness_m: float = Field(0.02, ge=0.0, le=1.0, description="m, from full light to full shade")
+    through_m: Vec2 = quantity("m", "world point on the edge", (0.0, 0.0))
+    azimuth_rad: float = quantity("rad", "direction of the edge; shade is on its left", 0.6)
+    depth_ratio: float = quantity("(ratio)", "share of the light taken away", 0.45, ge=0.0, le=1.0)
+    softness_m: float = quantity("m", "from full light to full shade", 0.02, ge=0.0, le=1.0)
 
 
 class GlareConfig(Section):
     """A lamp mirrored by floor and marks: white light added over a round spot."""
 
-    x_m: float = Field(0.2, description="m, world")
-    y_m: float = Field(0.1, description="m, world")
-    radius_m: float = Field(0.08, gt=0.0, le=2.0, description="m, standard deviation of the spot")
-    peak_dn: float = Field(120.0, ge=0.0, le=1000.0, description="DN added in its middle")
+    x_m: float = quantity("m", "world", 0.2)
+    y_m: float = quantity("m", "world", 0.1)
+    radius_m: float = quantity("m", "standard deviation of the spot", 0.08, gt=0.0, le=2.0)
+    peak_dn: float = quantity("DN", "added in its middle", 120.0, ge=0.0, le=1000.0)
 
 
 class SceneConfig(Section):
     """Floor, light and sensor of the rendered camera (twin only)."""
 
-    floor_colour: Colour = Field((0.36, 0.41, 0.44), description="warm grey laboratory floor")
-    texture_ratio: float = Field(
-        0.08, ge=0.0, le=0.5, description="RMS speckle of the floor, relative"
+    floor_colour: Colour = quantity("(ratio)", "warm grey laboratory floor", (0.36, 0.41, 0.44))
+    texture_ratio: float = quantity(
+        "(ratio)", "RMS speckle of the floor, relative", 0.08, ge=0.0, le=0.5
     )
-    texture_seed: int = Field(1, ge=0, description="draws the floor; not tied to the run's seed")
-    tile_m: float = Field(0.5, gt=0.05, le=10.0, description="m between tile joints")
-    white_dn: float = Field(
-        225.0,
-        gt=1.0,
-        le=1000.0,
-        description="DN of a white surface in full light: just not clipped",
+    texture_seed: int = quantity("", "draws the floor; not tied to the run's seed", 1, ge=0)
+    tile_m: float = quantity("m", "between tile joints", 0.5, gt=0.05, le=10.0)
+    white_dn: float = quantity(
+        "DN", "of a white surface in full light: just not clipped", 225.0, gt=1.0, le=1000.0
     )
-    gradient_ratio: float = Field(
-        0.35, ge=0.0, lt=1.0, description="light lost from the bright to the dark side of the image"
+    gradient_ratio: float = quantity(
+        "(ratio)", "light lost from the bright to the dark side of the image", 0.35, ge=0.0, lt=1.0
     )
-    gradient_azimuth_rad: float = Field(0.5, description="rad, image direction of the bright side")
-    read_noise_dn: float = Field(1.5, ge=0.0, le=10.0, description="DN RMS, webcam at low gain")
-    full_well_e: float = Field(
-        6000.0, ge=20.0, description="electrons at 255 DN: a 3 um pixel; sets the shot noise"
+    gradient_azimuth_rad: float = quantity("rad", "image direction of the bright side", 0.5)
+    read_noise_dn: float = quantity(
+        "DN", "RMS", 1.5, ge=0.0, le=10.0, source="a webcam at low gain"
     )
-    blur_px: float = Field(0.6, ge=0.0, le=3.0, description="px RMS, optics and demosaicing")
-    white_balance: tuple[float, float, float] = Field(
-        (1.0, 1.0, 1.0), description="gain error per channel (b, g, r)"
+    full_well_e: float = quantity(
+        "electrons", "at 255 DN; sets the shot noise", 6000.0, ge=20.0, source="a 3 um pixel"
     )
-    lamp_lean: Vec2 = Field((0.35, 0.25), description="horizontal over vertical way to the lamp")
-    robot_shade_ratio: float = Field(
-        0.40, ge=0.0, le=1.0, description="light the robot takes from the floor beside it"
+    blur_px: float = quantity("px", "RMS, optics and demosaicing", 0.6, ge=0.0, le=3.0)
+    white_balance: tuple[float, float, float] = quantity(
+        "(ratio)", "gain error per channel (b, g, r)", (1.0, 1.0, 1.0)
+    )
+    lamp_lean: Vec2 = quantity("(ratio)", "horizontal over vertical way to the lamp", (0.35, 0.25))
+    robot_shade_ratio: float = quantity(
+        "(ratio)", "light the robot takes from the floor beside it", 0.40, ge=0.0, le=1.0
     )
     shadow_edge: ShadowEdgeConfig | None = None
     glare: GlareConfig | None = None
@@ -239,23 +259,29 @@ class SceneConfig(Section):
 class CameraConfig(Section):
     """Frame source: resolution, timing, optics, pose, and what is in view."""
 
-    width_px: int = Field(640, ge=64, le=4096, description="px, default condition")
-    height_px: int = Field(480, ge=64, le=4096, description="px, default condition")
-    rate_hz: float = Field(30.0, gt=0.0, le=500.0, description="Hz, default condition")
-    exposure_s: float = Field(
-        0.006, gt=0.0, le=0.1, description="s, indoor light; 3 mm of blur at 0.5 m/s"
+    width_px: int = quantity(
+        "px", "width of a frame", 640, ge=64, le=4096, source="default condition"
     )
-    latency_s: float = Field(
-        0.060, ge=0.0, le=1.0, description="s, middle of exposure to host, default condition"
+    height_px: int = quantity(
+        "px", "height of a frame", 480, ge=64, le=4096, source="default condition"
     )
-    latency_jitter_s: float = Field(
-        0.010, ge=0.0, le=0.5, description="s, standard deviation, default condition"
+    rate_hz: float = quantity(
+        "Hz", "frames per second", 30.0, gt=0.0, le=500.0, source="default condition"
     )
-    drop_ratio: float = Field(
-        0.01, ge=0.0, le=1.0, description="share of frames lost, default condition"
+    exposure_s: float = quantity(
+        "s", "3 mm of blur at 0.5 m/s", 0.006, gt=0.0, le=0.1, source="indoor light"
     )
-    search_radius_m: float = Field(
-        0.06, gt=0.0, le=2.0, description="m, window around the prediction: 0.5 m/s over 4 frames"
+    latency_s: float = quantity(
+        "s", "middle of exposure to host", 0.060, ge=0.0, le=1.0, source="default condition"
+    )
+    latency_jitter_s: float = quantity(
+        "s", "standard deviation", 0.010, ge=0.0, le=0.5, source="default condition"
+    )
+    drop_ratio: float = quantity(
+        "(ratio)", "share of frames lost", 0.01, ge=0.0, le=1.0, source="default condition"
+    )
+    search_radius_m: float = quantity(
+        "m", "window around the prediction: 0.5 m/s over 4 frames", 0.06, gt=0.0, le=2.0
     )
     localiser: Annotated[str, known_name(LOCALISERS)] = Field(
         "marks", description="what finds the robot: marks, tags, or a file"

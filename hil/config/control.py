@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, model_validator
 
-from hil.config.base import OpenSection, Section, known_name
+from hil.config.base import OpenSection, Section, known_name, quantity
 from hil.config.gains import Gains, GainSets
 from hil.core.registries import ESTIMATORS, OUTER_LAWS, REFERENCES
 
@@ -20,98 +20,97 @@ EstimatorName = Annotated[str, known_name(ESTIMATORS)]
 class OuterLimits(Section):
     """Restrictions on trajectory and control (8.11); both laws run under the same ones."""
 
-    eta1_max_m_s: float = Field(
-        0.5, gt=0, le=5, description="m/s, forward speed command; what the drive holds when sagging"
+    eta1_max_m_s: float = quantity(
+        "m/s", "forward speed command; what the drive holds when sagging", 0.5, gt=0, le=5
     )
-    theta_dot_max_rad_s: float = Field(
-        2.5, gt=0, le=20, description="rad/s, turn rate command; skid steering scrubs beyond it"
+    theta_dot_max_rad_s: float = quantity(
+        "rad/s", "turn rate command; skid steering scrubs beyond it", 2.5, gt=0, le=20
     )
-    zeta_max_m_s2: float = Field(
-        1.0, gt=0, le=50, description="m/s^2, zeta = d eta1/dt; keeps the wheels from slipping"
+    zeta_max_m_s2: float = quantity(
+        "m/s^2", "zeta = d eta1/dt; keeps the wheels from slipping", 1.0, gt=0, le=50
     )
-    v1_max_m_s3: float = Field(
-        10.0, gt=0, le=1e4, description="m/s^3, v1 = d zeta/dt; zeta limit within 3 ticks"
+    v1_max_m_s3: float = quantity(
+        "m/s^3", "v1 = d zeta/dt; zeta limit within 3 ticks", 10.0, gt=0, le=1e4
     )
-    theta_ddot_max_rad_s2: float = Field(
-        12.0, gt=0, le=1e4, description="rad/s^2, |u2|/d0; full turn rate within 6 ticks"
+    theta_ddot_max_rad_s2: float = quantity(
+        "rad/s^2", "|u2|/d0; full turn rate within 6 ticks", 12.0, gt=0, le=1e4
     )
-    approach_speed_m_s: float | None = Field(
-        0.4, gt=0, le=5, description="m/s, most that the position error asks for"
+    approach_speed_m_s: float | None = quantity(
+        "m/s", "most that the position error asks for", 0.4, gt=0, le=5
     )
-    approach_accel_m_s2: float | None = Field(
-        1.0, gt=0, le=50, description="m/s^2, most that the velocity error asks for"
+    approach_accel_m_s2: float | None = quantity(
+        "m/s^2", "most that the velocity error asks for", 1.0, gt=0, le=50
     )
-    lambda_m_s: float = Field(0.05, ge=1e-4, le=1, description="m/s, damping of the inverse of B")
-    spin_decay_s: float = Field(
-        0.2, gt=0, le=10, description="s, a turn dies with it where B is damped"
+    lambda_m_s: float = quantity("m/s", "damping of the inverse of B", 0.05, ge=1e-4, le=1)
+    spin_decay_s: float = quantity("s", "a turn dies with it where B is damped", 0.2, gt=0, le=10)
+    zeta_start_m_s2: float = quantity(
+        "m/s^2", "start of zeta at standstill, where B is singular", 0.1, ge=0, le=5
     )
-    zeta_start_m_s2: float = Field(
-        0.1, ge=0, le=5, description="m/s^2, start of zeta at standstill, where B is singular"
+    lead_s: float = quantity(
+        "s", "lead of set-points; half the wheel lag, as noise grows", 0.03, ge=0, le=0.5
     )
-    lead_s: float = Field(
-        0.03, ge=0, le=0.5, description="s, lead of set-points; half the wheel lag, as noise grows"
+    hold_enter_m: float = quantity(
+        "m", "arrived: rest within; estimate's noise is 0.5 mm; 0 = never", 0.0025, ge=0, le=1
     )
-    hold_enter_m: float = Field(
-        0.0025,
-        ge=0,
-        le=1,
-        description="m, arrived: rest within; estimate's noise is 0.5 mm; 0 = never",
+    hold_leave_m: float = quantity(
+        "m", "pushed away: start anew beyond; well above hold_enter_m", 0.006, gt=0, le=1
     )
-    hold_leave_m: float = Field(
-        0.006, gt=0, le=1, description="m, pushed away: start anew beyond; well above hold_enter_m"
-    )
+
+    @model_validator(mode="after")
+    def _leaves_beyond_entering(self) -> OuterLimits:
+        if self.hold_leave_m < self.hold_enter_m:
+            raise ValueError(
+                f"hold_leave_m must be at least hold_enter_m = {self.hold_enter_m:g} m"
+            )
+        return self
 
 
 class EstimatorConfig(Section):
     """What the estimator assumes of robot, camera and wheel loop."""
 
-    wheel_lag_s: float = Field(
-        0.05, gt=0, le=0.5, description="s, first-order lag of the wheel loop, for the prediction"
+    wheel_lag_s: float = quantity(
+        "s", "first-order lag of the wheel loop, for the prediction", 0.05, gt=0, le=0.5
     )
-    sigma_accel_rad_s2: float = Field(
-        6.0, gt=0, le=1e4, description="rad/s^2, wheel acceleration the lag model misses (1 sigma)"
+    sigma_accel_rad_s2: float = quantity(
+        "rad/s^2", "wheel acceleration the lag model misses (1 sigma)", 6.0, gt=0, le=1e4
     )
-    sigma_short_rad_s15: float = Field(
-        0.5, gt=0, le=1e3, description="rad/s^1.5, random walk of the wheel loop's standing error"
+    sigma_short_rad_s15: float = quantity(
+        "rad/s^1.5", "random walk of the wheel loop's standing error", 0.5, gt=0, le=1e3
     )
-    sigma_scale: float = Field(
-        0.15, gt=0, le=1, description="ratio, prior 1 sigma of the distance and turn scales"
+    sigma_scale: float = quantity(
+        "(ratio)", "prior 1 sigma of the distance and turn scales", 0.15, gt=0, le=1
     )
-    sigma_d0_m: float = Field(
-        0.005, gt=0, le=0.1, description="m, prior 1 sigma of d0: skid steering moves it about"
+    sigma_d0_m: float = quantity(
+        "m", "prior 1 sigma of d0: skid steering moves it about", 0.005, gt=0, le=0.1
     )
-    d0_walk_m_rad05: float = Field(
-        3e-4, ge=0, le=0.1, description="m/rad^0.5, random walk of d0 over the angle turned"
+    d0_walk_m_rad05: float = quantity(
+        "m/rad^0.5", "random walk of d0 over the angle turned", 3e-4, ge=0, le=0.1
     )
-    slip_ratio: float = Field(
-        0.02, ge=0, le=1, description="m^0.5, random walk of odometry per path"
+    slip_ratio: float = quantity("m^0.5", "random walk of odometry per path", 0.02, ge=0, le=1)
+    drift_m_s05: float = quantity(
+        "m/s^0.5", "position random walk at rest (pushed, floor uneven)", 5e-4, ge=0, le=1
     )
-    drift_m_s05: float = Field(
-        5e-4, ge=0, le=1, description="m/s^0.5, position random walk at rest (pushed, floor uneven)"
+    drift_rad_s05: float = quantity("rad/s^0.5", "heading random walk at rest", 2e-3, ge=0, le=1)
+    sigma_time_s: float = quantity(
+        "s", "1 sigma of the tie between camera and board time", 0.003, ge=0, le=0.1
     )
-    drift_rad_s05: float = Field(
-        2e-3, ge=0, le=1, description="rad/s^0.5, heading random walk at rest"
+    gate_chi2: float = quantity(
+        "", "squared Mahalanobis gate on a pose; 3 dof at 99.9 %", 16.3, gt=0, le=1e6
     )
-    sigma_time_s: float = Field(
-        0.003, ge=0, le=0.1, description="s, 1 sigma of the tie between camera and board time"
+    reacquire_poses: int = quantity(
+        "poses", "run of agreeing gated poses to believe", 5, ge=2, le=100
     )
-    gate_chi2: float = Field(
-        16.3, gt=0, le=1e6, description="squared Mahalanobis gate on a pose; 3 dof at 99.9 %"
+    history_s: float = quantity(
+        "s", "oldest exposure that can still be taken in", 1.0, gt=0.2, le=10
     )
-    reacquire_poses: int = Field(
-        5, ge=2, le=100, description="run of agreeing gated poses to believe"
+    st_accel_m_s2: float = quantity(
+        "m/s^2", "camera-only: L of the z1 differentiator", 0.5, gt=0, le=100
     )
-    history_s: float = Field(
-        1.0, gt=0.2, le=10, description="s, oldest exposure that can still be taken in"
+    st_jerk_m_s3: float = quantity(
+        "m/s^3", "camera-only: L of the z2 differentiator", 1.0, gt=0, le=1000
     )
-    st_accel_m_s2: float = Field(
-        0.5, gt=0, le=100, description="m/s^2, camera-only: L of the z1 differentiator"
-    )
-    st_jerk_m_s3: float = Field(
-        1.0, gt=0, le=1000, description="m/s^3, camera-only: L of the z2 differentiator"
-    )
-    st_theta_ddot_rad_s2: float = Field(
-        8.0, gt=0, le=1000, description="rad/s^2, camera-only: L of the heading differentiator"
+    st_theta_ddot_rad_s2: float = quantity(
+        "rad/s^2", "camera-only: L of the heading differentiator", 8.0, gt=0, le=1000
     )
 
 
@@ -125,43 +124,50 @@ class ReferenceConfig(OpenSection):
         """Return the model of the kind that a table names; raises BadInput for an unknown one."""
         return REFERENCES.get(str(tree.get("kind", ""))).settings or cls
 
+    @classmethod
+    def models(cls) -> list[type[BaseModel]]:
+        """Return the models of all kinds."""
+        return [entry.settings for entry in REFERENCES.entries() if entry.settings is not None]
+
 
 class PointReference(ReferenceConfig):
     """A desired point on the floor for the flat output, reached and held."""
 
-    kind: Literal["point"] = "point"
-    x_m: float = Field(0.0, ge=-100, le=100, description="m, world X of z1*")
-    y_m: float = Field(0.0, ge=-100, le=100, description="m, world Y of z1*")
+    kind: Literal["point"] = Field("point", description="of this reference")
+    x_m: float = quantity("m", "world X of z1*", 0.0, ge=-100, le=100)
+    y_m: float = quantity("m", "world Y of z1*", 0.0, ge=-100, le=100)
 
 
 class CircleReference(ReferenceConfig):
     """The circle (8.23): the centre of mass runs clockwise from (0, radius), z1* leads it by d0."""
 
-    kind: Literal["circle"] = "circle"
-    radius_m: float = Field(8.0, gt=0, le=100, description="m, (8.23)")
-    rate_rad_s: float = Field(0.1, gt=0, le=5, description="rad/s, (8.23)")
-    d0_m: float = Field(0.03, gt=0, le=0.15, description="m, offset of the flat output (2.31)")
-    center_x_m: float = Field(0.0, ge=-100, le=100, description="m, world X of the centre")
-    center_y_m: float = Field(0.0, ge=-100, le=100, description="m, world Y of the centre")
+    kind: Literal["circle"] = Field("circle", description="of this reference")
+    radius_m: float = quantity("m", "radius of the circle", 8.0, gt=0, le=100, source="(8.23)")
+    rate_rad_s: float = quantity(
+        "rad/s", "angular rate of the circle", 0.1, gt=0, le=5, source="(8.23)"
+    )
+    d0_m: float = quantity("m", "offset of the flat output (2.31)", 0.03, gt=0, le=0.15)
+    center_x_m: float = quantity("m", "world X of the centre", 0.0, ge=-100, le=100)
+    center_y_m: float = quantity("m", "world Y of the centre", 0.0, ge=-100, le=100)
 
 
 class WaypointReference(ReferenceConfig):
     """A smooth path through waypoints from rest to rest, three times differentiable in time."""
 
-    kind: Literal["waypoints"] = "waypoints"
-    points_m: tuple[tuple[float, float], ...] = Field(
-        min_length=2, max_length=200, description="m, world (X, Y) that z1* passes, in order"
+    kind: Literal["waypoints"] = Field("waypoints", description="of this reference")
+    points_m: tuple[tuple[float, float], ...] = quantity(
+        "m", "world (X, Y) that z1* passes, in order", min_length=2, max_length=200
     )
-    speed_max_m_s: float = Field(0.3, gt=0, le=5, description="m/s, bound on |d z1*/dt|")
-    turn_rate_max_rad_s: float = Field(
-        1.5, gt=0, le=20, description="rad/s, bound on the turn rate that the path asks for"
+    speed_max_m_s: float = quantity("m/s", "bound on |d z1*/dt|", 0.3, gt=0, le=5)
+    turn_rate_max_rad_s: float = quantity(
+        "rad/s", "bound on the turn rate that the path asks for", 1.5, gt=0, le=20
     )
 
 
 class ControlConfig(Section):
     """The outer loop of a scenario."""
 
-    rate_hz: float = Field(30.0, ge=1, le=200, description="Hz, outer tick; the camera's rate")
+    rate_hz: float = quantity("Hz", "outer tick; the camera's rate", 30.0, ge=1, le=200)
     outer: OuterLawName = Field("asg-ism", description="outer law")
     estimator: EstimatorName = Field("fused", description="state estimator")
     limits: OuterLimits = Field(default_factory=OuterLimits, description="restrictions, both laws")

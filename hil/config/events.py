@@ -5,13 +5,14 @@ Exchanged colour marks are no event but a property of the robot: `camera.marks.s
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from collections.abc import Mapping
+from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hil.config.base import Section
+from hil.config.base import Section, quantity
 
-# On what a disturbance acts; the name ends in the unit of its amplitude.
+# On what a disturbance acts; TARGET_UNITS has the unit of its amplitude.
 # eta2_dot under the operative constraint acts as theta_ddot = -eta2_dot / d0 (2.31).
 Target = Literal[
     "eta1_dot_m_s2",  # body forward acceleration
@@ -27,6 +28,12 @@ Target = Literal[
     "friction_change_ratio",  # added to 1, scales rolling and sliding friction
     "battery_sag_v",  # taken off the battery voltage
 ]
+TARGET_UNITS: Mapping[str, str] = {
+    "eta1_dot_m_s2": "m/s^2", "eta2_dot_m_s2": "m/s^2", "theta_ddot_rad_s2": "rad/s^2",
+    "force_forward_n": "N", "force_left_n": "N", "torque_yaw_n_m": "N m",
+    "load_left_n_m": "N m", "load_right_n_m": "N m", "slope_x_rad": "rad", "slope_y_rad": "rad",
+    "friction_change_ratio": "(ratio)", "battery_sag_v": "V",
+}  # fmt: skip
 Shape = Literal["sine", "step", "pulse", "noise"]
 FaultKind = Literal[
     "dead_encoder",  # both channels of one side stay as they are
@@ -55,9 +62,9 @@ SIDED = {
 class Zone(Section):
     """A round piece of floor; its edge is 1 cm soft."""
 
-    x_m: float = Field(ge=-50, le=50, description="world X of the centre")
-    y_m: float = Field(ge=-50, le=50, description="world Y of the centre")
-    radius_m: float = Field(ge=0.02, le=50)
+    x_m: float = quantity("m", "world X of the centre", ge=-50, le=50)
+    y_m: float = quantity("m", "world Y of the centre", ge=-50, le=50)
+    radius_m: float = quantity("m", "radius of the zone", ge=0.02, le=50)
 
 
 class Disturbance(Section):
@@ -67,15 +74,22 @@ class Disturbance(Section):
     from start to end; noise: seeded, standard deviation `amplitude`, band up to `frequency_hz`.
     """
 
-    target: Target
-    shape: Shape
-    amplitude: float = Field(ge=-1000, le=1000, description="in the unit the target's name ends in")
-    start_s: float = Field(0.0, ge=0, le=3600)
-    end_s: float | None = Field(None, gt=0, le=3600, description="None: to the end of the run")
-    frequency_hz: float = Field(0.5, gt=0, le=200, description="of the sine, or top of the noise")
-    phase_rad: float = Field(0.0, ge=-7, le=7, description="of the sine")
-    seed: int = Field(1, ge=0, le=2**31 - 1, description="of the noise, with the seed of the run")
+    target: Target = Field(description="what it acts on")
+    shape: Shape = Field(description="its course in time")
+    amplitude: float = quantity("", "in the unit of the target", ge=-1000, le=1000)
+    start_s: float = quantity("s", "in force from then on", 0.0, ge=0, le=3600)
+    end_s: float | None = quantity("s", "None: to the end of the run", None, gt=0, le=3600)
+    frequency_hz: float = quantity("Hz", "of the sine, or top of the noise", 0.5, gt=0, le=200)
+    phase_rad: float = quantity("rad", "of the sine", 0.0, ge=-7, le=7)
+    seed: int = quantity("", "of the noise, with the seed of the run", 1, ge=0, le=2**31 - 1)
     zone: Zone | None = Field(None, description="acts only while the centre of mass is in there")
+
+    @classmethod
+    def unit_of(cls, name: str, table: Mapping[str, Any]) -> str:
+        """Return the unit of a value; that of the amplitude is its target's."""
+        if name == "amplitude":
+            return TARGET_UNITS.get(str(table.get("target")), "")
+        return super().unit_of(name, table)
 
     @model_validator(mode="after")
     def _ends_after_start(self) -> Self:
@@ -88,10 +102,10 @@ class Disturbance(Section):
 class Fault(Section):
     """One fault in force from `start_s` to `end_s`; with `start_s` 0 it is there from power-up on."""
 
-    kind: FaultKind
+    kind: FaultKind = Field(description="what breaks")
     side: Literal["left", "right", "both"] = Field("both", description="of encoders and motors")
-    start_s: float = Field(0.0, ge=0, le=3600)
-    end_s: float | None = Field(None, gt=0, le=3600, description="None: to the end of the run")
+    start_s: float = quantity("s", "in force from then on; 0: from power-up", 0.0, ge=0, le=3600)
+    end_s: float | None = quantity("s", "None: to the end of the run", None, gt=0, le=3600)
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:

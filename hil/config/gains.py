@@ -33,6 +33,11 @@ class Gains(OpenSection):
         """Return the model with a table for every outer law that is registered now."""
         return gains_model()
 
+    @classmethod
+    def models(cls) -> list[type[BaseModel]]:
+        """Return the one model there is."""
+        return [gains_model()]
+
     def __reduce__(self) -> Any:
         """Pickle as tables, with the texts of laws from files: the model is made where it arrives."""
         sources = [entry.source for entry in OUTER_LAWS.entries() if entry.source is not None]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
-from hil.config.base import Section
+from hil.config.base import Section, quantity
 
 
 class LinkConfig(Section):
@@ -15,21 +15,21 @@ class LinkConfig(Section):
     Chunks never overtake each other and never arrive before they were sent.
     """
 
-    baud: int = Field(
-        57_600, ge=1_200, le=2_000_000, description="bit/s, 10 bits a byte; the HC-05 of the thesis"
+    baud: int = quantity(
+        "bit/s", "10 bits a byte", 57_600, ge=1_200, le=2_000_000, source="the HC-05 of the thesis"
     )
-    latency_s: float = Field(
-        0.020, ge=0, le=2, description="mean delay of a chunk, s; serial Bluetooth, assumed"
+    latency_s: float = quantity(
+        "s", "mean delay of a chunk", 0.020, ge=0, le=2, source="assumed: serial Bluetooth"
     )
-    latency_jitter_s: float = Field(
-        0.010, ge=0, le=2, description="half width of the delay's spread, s; assumed"
+    latency_jitter_s: float = quantity(
+        "s", "half width of the delay's spread", 0.010, ge=0, le=2, source="assumed"
     )
-    loss_ratio: float = Field(0.0, ge=0, le=0.9, description="mean share of chunks lost")
-    loss_burst_chunks: float = Field(
-        1.5, ge=1, le=1000, description="mean length of a run of lost chunks (two-state Gilbert)"
+    loss_ratio: float = quantity("(ratio)", "mean share of chunks lost", 0.0, ge=0, le=0.9)
+    loss_burst_chunks: float = quantity(
+        "chunks", "mean length of a run of lost chunks (two-state Gilbert)", 1.5, ge=1, le=1000
     )
-    corruption_ratio: float = Field(
-        0.0, ge=0, le=0.5, description="share of bytes that arrive with other bits"
+    corruption_ratio: float = quantity(
+        "(ratio)", "share of bytes that arrive with other bits", 0.0, ge=0, le=0.5
     )
 
     @model_validator(mode="after")

@@ -14,32 +14,19 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from hil.board._firmware import parameter_table
+from hil.config.fields import told
 from hil.config.gains import shipped_gains
+from hil.config.limits import board_defaults, check_board
 from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
 from hil.core.registry import is_file_name
 
+# Values that would be laid aside: the command's own option (in a campaign, its list) decides them.
+_BY_OPTION = {"board.LAW": "--inner", "control.outer": "--outer"}
+
 Tree = dict[str, Any]
 Model = TypeVar("Model", bound=BaseModel)
-
-# Longest first, so that m_s2 is not read as s2.
-UNITS = {
-    "rad_s2": "rad/s^2", "m_s3": "m/s^3", "m_s2": "m/s^2", "rad_s": "rad/s", "m_s": "m/s",
-    "kg_m2": "kg m^2", "n_m_s": "N m s", "n_m": "N m", "bit_s": "bit/s", "baud": "bit/s",
-    "ratio": "(ratio)", "rad": "rad", "deg": "deg", "kg": "kg", "mm": "mm", "px": "px", "hz": "Hz",
-    "ohm": "ohm", "mv": "mV", "ms": "ms", "us": "us", "m": "m", "s": "s", "v": "V", "a": "A",
-    "h": "H", "n": "N",
-}  # fmt: skip
-
-
-def unit_of(key: str) -> str:
-    """Return the unit a key's name ends in ("" when it names none)."""
-    for suffix in sorted(UNITS, key=len, reverse=True):
-        if key.endswith(f"_{suffix}"):
-            return UNITS[suffix]
-    return ""
 
 
 def builtin_names(kind: str) -> list[str]:
@@ -57,7 +44,7 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
     names. Raises BadInput.
     """
     tree = read_tree(name_or_path, "scenarios")
-    tree["board"] = board_defaults() | tree.get("board", {})
+    _fill_board(tree)
     _lay_over_shipped_gains(tree)
     scenario = build(Scenario, tree, name_or_path)
     if overrides:
@@ -80,47 +67,42 @@ def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
     tree = scenario.model_dump(mode="json")
     for text in overrides:
         set_value(tree, text)
+    _fill_board(tree)
     changed = build(Scenario, tree, "--set")
     check_board(changed.board)
     return changed
 
 
-def board_defaults() -> dict[str, float]:
-    """Return every parameter of the board with the default its firmware has."""
-    return {entry.name: entry.default for entry in parameter_table()}
+def _fill_board(tree: Tree) -> None:
+    """Lay the board's table over the defaults, so that a run never depends on what a board had."""
+    board = tree.get("board", {})
+    if isinstance(board, dict):
+        tree["board"] = board_defaults() | board
 
 
-def check_board(values: Mapping[str, float]) -> None:
-    """Raise BadInput for a board parameter that does not exist or lies outside its bounds."""
-    table = {entry.name: entry for entry in parameter_table()}
-    for name, value in values.items():
-        entry = table.get(name)
-        if entry is None:
-            near = difflib.get_close_matches(name, table, n=3, cutoff=0.5) or list(table)
-            raise BadInput(f"board.{name}: no such parameter of the board; near: {', '.join(near)}")
-        if not entry.minimum <= value <= entry.maximum:
-            raise BadInput(
-                f"board.{name} = {value:g} {entry.unit}: allowed are {entry.minimum:g} to "
-                f"{entry.maximum:g} {entry.unit}".rstrip()
-            )
+def read_tree(name_or_path: str, kind: str, above: tuple[str, ...] = ()) -> Tree:
+    """Return a file's tables laid over those of its `base`, robot and camera files filled in.
 
-
-def read_tree(name_or_path: str, kind: str) -> Tree:
-    """Return a file's tables laid over those of its `base`, robot and camera files filled in."""
+    `above` are the files that lie on this one.
+    """
+    if name_or_path in above:
+        raise BadInput(f"{name_or_path}: lies on itself: {' on '.join((*above, name_or_path))}")
+    above = (*above, name_or_path)
     text, where, folder = _read_text(name_or_path, kind)
     try:
         tree = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # a number or brackets beyond what Python takes
         raise BadInput(f"{where}: not valid TOML: {error}") from None
     for part in ("robot", "camera"):
         if isinstance(tree.get(part), Mapping) and "file" in tree[part]:
             own = dict(tree[part])
-            below = read_tree(_beside(folder, str(own.pop("file"))), f"{part}s")
+            below = read_tree(_beside(folder, str(own.pop("file"))), f"{part}s", above)
             tree[part] = merge(below, own)
     _set_files_beside(tree, folder)
     base = tree.pop("base", None)
     if base is not None:
-        tree = merge(read_tree(_beside(folder, str(base)), _base_kind(str(base), kind)), tree)
+        below = read_tree(_beside(folder, str(base)), _base_kind(str(base), kind), above)
+        tree = merge(below, tree)
     return tree
 
 
@@ -199,12 +181,14 @@ def set_value(tree: Tree, text: str) -> None:
     key, equals, value_text = text.partition("=")
     key = key.strip()
     if not equals:
-        raise BadInput(f"--set {text!r}: needs KEY=VALUE, for example robot.mass_kg=3.1")
+        raise BadInput(f"--set {_clip(repr(text))}: needs KEY=VALUE, for example robot.mass_kg=3.1")
     put_value(tree, key, parse_value(value_text))
 
 
 def put_value(tree: Tree, key: str, value: Any) -> None:
     """Put a value where the dotted name says, in place; an unknown one is a BadInput."""
+    if key in _BY_OPTION:
+        raise BadInput(f"--set {key}: an option decides it; use {_BY_OPTION[key]} (or its list)")
     parent, leaf = _find(tree, key)
     if parent is None:
         names = dotted_names(tree)
@@ -213,7 +197,7 @@ def put_value(tree: Tree, key: str, value: Any) -> None:
             name for name in names if name.split(".")[-1] == key.rsplit(".", maxsplit=1)[-1]
         ]
         hint = " or ".join(dict.fromkeys([*same_end[:2], *near])) or f"top level: {', '.join(tree)}"
-        raise BadInput(f"--set {key}: no such value; near: {hint}")
+        raise BadInput(f"--set {_clip(key)}: no such value; near: {hint}")
     parent[leaf] = value
 
 
@@ -225,7 +209,7 @@ def _find(tree: Tree, key: str) -> tuple[Any, Any]:
         rest = ".".join(parts[depth:])
         if isinstance(node, dict) and rest in node:  # a key may have dots itself (mismatch)
             return node, rest
-        index: Any = int(part) if isinstance(node, list) and part.isdigit() else part
+        index: Any = int(part) if isinstance(node, list) and _is_index(part) else part
         last = depth == len(parts) - 1
         if isinstance(node, dict) and index in node:
             pass
@@ -237,12 +221,22 @@ def _find(tree: Tree, key: str) -> tuple[Any, Any]:
     return None, None
 
 
+def _is_index(part: str) -> bool:
+    """Say whether a part of a dotted name counts into a list: a few plain digits."""
+    return part.isascii() and part.isdecimal() and len(part) <= 9
+
+
 def parse_value(text: str) -> Any:
     """Return a TOML value, or the text itself where it is not one (so names need no quotes)."""
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        tree = tomllib.loads(f"value = {text}")
+    except (
+        ValueError,
+        RecursionError,
+    ):  # no TOML, or a number or brackets beyond what Python takes
         return text.strip()
+    # A line end in the text would begin another key.
+    return tree["value"] if len(tree) == 1 else text.strip()
 
 
 def dotted_names(tree: Any, prefix: str = "") -> list[str]:
@@ -264,10 +258,10 @@ def build(model: type[Model], tree: Tree, where: str) -> Model:
     try:
         return model.model_validate(tree)
     except ValidationError as error:
-        raise BadInput(f"{where}: {_explain(error, tree)}") from None
+        raise BadInput(f"{where}: {_explain(model, error, tree)}") from None
 
 
-def _explain(error: ValidationError, tree: Tree) -> str:
+def _explain(model: type[BaseModel], error: ValidationError, tree: Tree) -> str:
     """Return key, value with unit, and limit of the first violation."""
     first = error.errors(include_url=False)[0]
     key = _key(first["loc"], tree)
@@ -280,10 +274,23 @@ def _explain(error: ValidationError, tree: Tree) -> str:
     rest = f" (and {more} more)" if more else ""
     if isinstance(value, dict | list):
         return f"{key}: {limit}{rest}" if key else f"{limit}{rest}"
-    unit = unit_of(key)
+    unit = told(model, key, tree).unit
     if first["type"].startswith(("greater_than", "less_than")):
         limit = f"{limit} {unit}".strip()
-    return f"{key} = {f'{value!r} {unit}'.strip()}: {limit}{rest}"
+    return f"{key} = {f'{_short(value)} {unit}'.strip()}: {limit}{rest}"
+
+
+def _short(value: Any) -> str:
+    """Return a value as a message shows it: of a very long one its beginning."""
+    try:
+        text = repr(value)
+    except ValueError:  # an integer of thousands of digits
+        return "a number of thousands of digits"
+    return _clip(text)
+
+
+def _clip(text: str) -> str:
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def _key(loc: tuple[int | str, ...], tree: Tree) -> str:

@@ -6,30 +6,34 @@ Bounds stand here; the numbers and where each one comes from stand in the robot 
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hil.config.base import Section
+from hil.config.base import PlainName, Section, quantity
+from hil.config.limits import board_table
 
 
 class MotorConfig(Section):
     """One geared motor (2.11); torques are at the gearbox output, electrical constants at the rotor."""
 
-    per_side: int = Field(ge=1, le=4, description="motors in parallel on one bridge channel")
-    resistance_ohm: float = Field(gt=0, le=100, description="winding resistance R")
-    inductance_h: float = Field(ge=1e-4, le=0.1, description="winding inductance L")
-    torque_constant_n_m_a: float = Field(gt=0, le=1, description="k_t, N m per A at the rotor")
-    emf_constant_v_s_rad: float = Field(gt=0, le=1, description="k_b, V s per rad at the rotor")
-    gear_ratio: float = Field(ge=1, le=500, description="N, rotor turns for one wheel turn")
-    gear_efficiency_ratio: float = Field(gt=0, le=1, description="eta_g, share of torque passed on")
-    rotor_inertia_kg_m2: float = Field(
-        ge=0, le=1e-3, description="inertia of the rotor, rotor side"
+    per_side: int = quantity("motors", "motors in parallel on one bridge channel", ge=1, le=4)
+    resistance_ohm: float = quantity("ohm", "winding resistance R", gt=0, le=100)
+    inductance_h: float = quantity("H", "winding inductance L", ge=1e-4, le=0.1)
+    torque_constant_n_m_a: float = quantity("N m/A", "k_t, at the rotor", gt=0, le=1)
+    emf_constant_v_s_rad: float = quantity("V s/rad", "k_b, at the rotor", gt=0, le=1)
+    gear_ratio: float = quantity("(ratio)", "N, rotor turns for one wheel turn", ge=1, le=500)
+    gear_efficiency_ratio: float = quantity(
+        "(ratio)", "eta_g, share of torque passed on", gt=0, le=1
     )
-    coulomb_n_m: float = Field(ge=0, le=2, description="friction torque while turning")
-    stiction_n_m: float = Field(ge=0, le=2, description="friction torque just before turning")
-    stribeck_rad_s: float = Field(gt=0, le=20, description="speed at which half the excess is gone")
-    viscous_n_m_s_rad: float = Field(ge=0, le=1, description="friction torque per wheel speed")
+    rotor_inertia_kg_m2: float = quantity(
+        "kg m^2", "inertia of the rotor, rotor side", ge=0, le=1e-3
+    )
+    coulomb_n_m: float = quantity("N m", "friction torque while turning", ge=0, le=2)
+    stiction_n_m: float = quantity("N m", "friction torque just before turning", ge=0, le=2)
+    stribeck_rad_s: float = quantity("rad/s", "speed at which half the excess is gone", gt=0, le=20)
+    viscous_n_m_s_rad: float = quantity("N m s/rad", "friction torque per wheel speed", ge=0, le=1)
 
     @model_validator(mode="after")
     def _stiction_not_below_coulomb(self) -> Self:
@@ -41,39 +45,42 @@ class MotorConfig(Section):
 class BridgeConfig(Section):
     """H-bridge channel; the voltage it drops opposes the channel's current."""
 
-    drop_v: float = Field(
-        ge=0, le=5, description="part of the drop that does not depend on current"
-    )
-    resistance_ohm: float = Field(ge=0, le=10, description="rise of the drop with channel current")
-    smoothing_a: float = Field(ge=0.05, le=5, description="current over which the drop builds up")
+    drop_v: float = quantity("V", "part of the drop that does not depend on current", ge=0, le=5)
+    resistance_ohm: float = quantity("ohm", "rise of the drop with channel current", ge=0, le=10)
+    smoothing_a: float = quantity("A", "current over which the drop builds up", ge=0.05, le=5)
 
 
 class BatteryConfig(Section):
     """Open-circuit voltage straight in the charge, behind one resistance."""
 
-    full_v: float = Field(gt=0, le=60, description="open-circuit voltage at charge 1")
-    empty_v: float = Field(
-        gt=0, le=60, description="open-circuit voltage at charge 0 (of the line)"
-    )
-    capacity_a_h: float = Field(gt=0, le=100, description="charge from full to empty")
-    resistance_ohm: float = Field(ge=0, le=5, description="cells, plug and leads")
-    charge_start_ratio: float = Field(gt=0, le=1, description="charge when the run begins")
-    idle_a: float = Field(ge=0, le=10, description="current of board, radio and encoders")
+    full_v: float = quantity("V", "open-circuit voltage at charge 1", gt=0, le=60)
+    empty_v: float = quantity("V", "open-circuit voltage at charge 0 (of the line)", gt=0, le=60)
+    capacity_a_h: float = quantity("A h", "charge from full to empty", gt=0, le=100)
+    resistance_ohm: float = quantity("ohm", "cells, plug and leads", ge=0, le=5)
+    charge_start_ratio: float = quantity("(ratio)", "charge when the run begins", gt=0, le=1)
+    idle_a: float = quantity("A", "current of board, radio and encoders", ge=0, le=10)
+
+    @model_validator(mode="after")
+    def _empties(self) -> Self:
+        if self.empty_v > self.full_v:
+            raise ValueError(f"empty_v must be at most full_v = {self.full_v:g} V")
+        return self
 
 
 class FloorConfig(Section):
     """Contact of the wheels with the floor; signs of speeds are smoothed as v / sqrt(v^2 + v_s^2)."""
 
-    rolling_ratio: float = Field(ge=0, le=0.5, description="f_r, rolling resistance over load")
-    friction_ratio: float = Field(ge=0, le=2, description="mu, sliding friction over load")
-    smoothing_m_s: float = Field(
-        ge=0.0005, le=0.05, description="v_s of the model with the operative constraint"
+    rolling_ratio: float = quantity("(ratio)", "f_r, rolling resistance over load", ge=0, le=0.5)
+    friction_ratio: float = quantity("(ratio)", "mu, sliding friction over load", ge=0, le=2)
+    smoothing_m_s: float = quantity(
+        "m/s", "v_s of the model with the operative constraint", ge=0.0005, le=0.05
     )
-    slip_smoothing_m_s: float = Field(
-        ge=0.002, le=0.05, description="v_s of the slip variant: creep of the tyre under load"
+    slip_smoothing_m_s: float = quantity(
+        "m/s", "v_s of the slip variant: creep of the tyre under load", ge=0.002, le=0.05
     )
 
 
+_COUNTS = board_table()["ENC_COUNTS"]
 Magnitude = Annotated[float, Field(ge=0, le=1000)]
 Sides = tuple[Magnitude, Magnitude]
 
@@ -81,34 +88,39 @@ Sides = tuple[Magnitude, Magnitude]
 class BringUpConfig(Section):
     """What `hil bringup` measured with the wheels off the ground, (left, right) magnitudes."""
 
-    dead_duty_forward: Sides = Field(description="duty at which the wheels start, forward")
-    dead_duty_backward: Sides = Field(description="the same backward")
-    top_speed_forward_rad_s: Sides = Field(description="wheel speed at full duty, forward")
-    top_speed_backward_rad_s: Sides = Field(description="the same backward")
-    battery_v: float = Field(gt=0, le=60, description="battery at full speed")
+    dead_duty_forward: Sides = quantity("(ratio)", "duty at which the wheels start, forward")
+    dead_duty_backward: Sides = quantity("(ratio)", "the same backward")
+    top_speed_forward_rad_s: Sides = quantity("rad/s", "wheel speed at full duty, forward")
+    top_speed_backward_rad_s: Sides = quantity("rad/s", "the same backward")
+    battery_v: float = quantity("V", "battery at full speed", gt=0, le=60)
 
 
 class RobotConfig(Section):
     """A four-wheel skid-steer robot, two driven wheels a side (control.md section 1)."""
 
-    name: str = Field(min_length=1, max_length=60)
+    name: PlainName = Field(min_length=1, max_length=60, description="of the robot, for people")
     variant: Literal["constrained", "slip", "lifted"] = Field(
         description="constrained: eta2 = -d0 theta_dot (2.31) and rolling wheels; slip: neither; "
         "lifted: on blocks, the wheels turn freely"
     )
-    mass_kg: float = Field(ge=0.5, le=50, description="m")
-    inertia_kg_m2: float = Field(
-        ge=0.002, le=10, description="I about the vertical through the centre"
+    mass_kg: float = quantity("kg", "m, whole robot", ge=0.5, le=50)
+    inertia_kg_m2: float = quantity(
+        "kg m^2", "I about the vertical through the centre", ge=0.002, le=10
     )
-    wheel_radius_m: float = Field(ge=0.01, le=0.5, description="r")
-    track_m: float = Field(ge=0.05, le=2, description="W, distance of left and right wheels")
-    front_axle_m: float = Field(ge=0.01, le=2, description="a_f, centre of mass to front axle")
-    rear_axle_m: float = Field(ge=0.01, le=2, description="b, centre of mass to rear axle")
-    d0_m: float = Field(ge=0.005, le=1, description="d0 of the operative constraint (2.31)")
-    wheel_inertia_kg_m2: float = Field(ge=0, le=0.1, description="one wheel about its axle")
-    encoder_counts_per_turn: int = Field(ge=4, le=100_000, description="x4 counts a wheel turn")
-    board_clock_ppm: float = Field(
-        ge=-10_000, le=10_000, description="board clock fast against true time, parts per million"
+    wheel_radius_m: float = quantity("m", "r, of a wheel", ge=0.01, le=0.5)
+    track_m: float = quantity("m", "W, distance of left and right wheels", ge=0.05, le=2)
+    front_axle_m: float = quantity("m", "a_f, centre of mass to front axle", ge=0.01, le=2)
+    rear_axle_m: float = quantity("m", "b, centre of mass to rear axle", ge=0.01, le=2)
+    d0_m: float = quantity("m", "d0 of the operative constraint (2.31)", ge=0.005, le=1)
+    wheel_inertia_kg_m2: float = quantity("kg m^2", "one wheel about its axle", ge=0, le=0.1)
+    encoder_counts_per_turn: int = quantity(
+        "counts/turn",
+        "x4 counts a wheel turn; bounds are the board's (ENC_COUNTS)",
+        ge=math.ceil(_COUNTS.minimum),
+        le=math.floor(_COUNTS.maximum),
+    )
+    board_clock_ppm: float = quantity(
+        "ppm", "board clock fast against true time", ge=-10_000, le=10_000
     )
     motor: MotorConfig
     bridge: BridgeConfig

@@ -2,51 +2,90 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal, Self
 
-from pydantic import Field, SerializeAsAny
+from pydantic import Field, SerializeAsAny, field_validator, model_validator
 
-from hil.config.base import Section
+from hil.config.base import PlainName, Section, quantity
 from hil.config.camera import CameraConfig
 from hil.config.control import ControlConfig, ReferenceConfig
 from hil.config.events import Disturbance, Fault
 from hil.config.link import LinkConfig
 from hil.config.robot import RobotConfig
+from hil.core.errors import BadInput
+from hil.core.figures import BY_NAME, require_known
 
 
 class StartPose(Section):
     """Where the robot stands, at rest, when the run begins (world frame, centre of mass)."""
 
-    x_m: float = Field(ge=-50, le=50, description="world X of the centre of mass")
-    y_m: float = Field(ge=-50, le=50, description="world Y of the centre of mass")
-    theta_rad: float = Field(ge=-7, le=7, description="heading, counter-clockwise from world +X")
+    x_m: float = quantity("m", "world X of the centre of mass", ge=-50, le=50)
+    y_m: float = quantity("m", "world Y of the centre of mass", ge=-50, le=50)
+    theta_rad: float = quantity("rad", "heading, counter-clockwise from world +X", ge=-7, le=7)
 
 
 class Requirement(Section):
     """One figure of the run that must hold; the verdict is pass when min <= value <= max."""
 
     metric: str = Field(description="name of a figure of metrics.json")
-    min: float | None = Field(None, description="lowest value that holds, in the figure's unit")
-    max: float | None = Field(None, description="highest value that holds, in the figure's unit")
+    min: float | None = quantity("", "lowest value that holds, in the figure's unit", None)
+    max: float | None = quantity("", "highest value that holds, in the figure's unit", None)
+
+    @classmethod
+    def unit_of(cls, name: str, table: Mapping[str, Any]) -> str:
+        """Return the unit of a value; a bound has that of its figure."""
+        figure = BY_NAME.get(str(table.get("metric")))
+        return figure.unit if figure and name in {"min", "max"} else super().unit_of(name, table)
+
+    @field_validator("metric")
+    @classmethod
+    def _is_a_figure(cls, name: str) -> str:
+        try:
+            return require_known(name)
+        except BadInput as error:
+            raise ValueError(str(error)) from None
+
+    @model_validator(mode="after")
+    def _can_hold_and_fail(self) -> Self:
+        if self.min is None and self.max is None:
+            raise ValueError(
+                f"{self.metric} has neither min nor max: it would always hold; give one"
+            )
+        if self.min is not None and self.max is not None and self.min > self.max:
+            raise ValueError(
+                f"{self.metric}: min = {self.min:g} is above max = {self.max:g}: it could never hold"
+            )
+        return self
 
 
 class SafetyConfig(Section):
     """When the host stops the robot by itself."""
 
-    pose_lost_s: float = Field(0.7, gt=0, le=10, description="no accepted pose for this long")
-    link_lost_s: float = Field(0.5, gt=0, le=10, description="no wheel report for this long")
-    fence_x_min_m: float = Field(-1.0, description="geofence of the centre of mass, world X")
-    fence_x_max_m: float = Field(1.0, description="geofence of the centre of mass, world X")
-    fence_y_min_m: float = Field(-0.75, description="geofence of the centre of mass, world Y")
-    fence_y_max_m: float = Field(0.75, description="geofence of the centre of mass, world Y")
+    pose_lost_s: float = quantity("s", "no accepted pose for this long", 0.7, gt=0, le=10)
+    link_lost_s: float = quantity("s", "no wheel report for this long", 0.5, gt=0, le=10)
+    fence_x_min_m: float = quantity("m", "geofence of the centre of mass, world X", -1.0)
+    fence_x_max_m: float = quantity("m", "geofence of the centre of mass, world X", 1.0)
+    fence_y_min_m: float = quantity("m", "geofence of the centre of mass, world Y", -0.75)
+    fence_y_max_m: float = quantity("m", "geofence of the centre of mass, world Y", 0.75)
+
+    @model_validator(mode="after")
+    def _fence_has_an_inside(self) -> Self:
+        for axis in "xy":
+            low, high = (getattr(self, f"fence_{axis}_{end}_m") for end in ("min", "max"))
+            if low >= high:
+                raise ValueError(
+                    f"fence_{axis}_min_m = {low:g} m must be below fence_{axis}_max_m = {high:g} m"
+                )
+        return self
 
 
 class Scenario(Section):
     """One experiment: the same tree runs on every target."""
 
-    name: str = Field(min_length=1, max_length=80)
-    description: str = ""
-    duration_s: float = Field(gt=0, le=3600, description="length of the controlled part")
+    name: PlainName = Field(min_length=1, max_length=80, description="names the record's folder")
+    description: str = Field("", description="one sentence for the reports")
+    duration_s: float = quantity("s", "length of the controlled part", gt=0, le=3600)
     start: StartPose
     reference: SerializeAsAny[ReferenceConfig]
     requirements: tuple[Requirement, ...] = ()

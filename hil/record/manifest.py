@@ -89,6 +89,12 @@ class Manifest(BaseModel):
     dialect_hash: str = ""
     parameter_hash: str = ""
     firmware_build_id: str = ""
+    open_loop_of: str = Field(
+        "", description="the record that answered in place of a robot: the path is not this law's"
+    )
+    notes: list[str] = Field(
+        default_factory=list, description="what a reader must know before trusting the figures"
+    )
     start_time_utc: str = ""
     start_unix_us: int = Field(
         0, description="wall time of t_s = 0, in link.tlog too; until control begins, of opening"

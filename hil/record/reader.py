@@ -63,7 +63,9 @@ class RunRecord:
         return metrics.LinkStats(**known)
 
     def figures(self) -> metrics.Figures:
-        """Return the figures, computed from the samples."""
+        """Return the figures, computed from the samples; all are NaN below two ticks."""
+        if self.samples["t_s"].size < 2:
+            return metrics.no_figures(self.samples)
         return metrics.compute(self.samples, self.link_stats())
 
     def verdicts(self) -> tuple[metrics.Verdict, ...]:

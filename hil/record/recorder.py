@@ -156,8 +156,7 @@ class Recorder:
             events=read_events(self.path / layout.EVENTS),
             pictures=read_pictures(self.path / layout.PICTURES),
         )
-        if samples["t_s"].size >= 2:
-            self._write_figures(run)
+        self._write_figures(run)
         if self._rerun:
             from hil.record.rrd import write_rrd  # noqa: PLC0415 - half a second, only when used
 

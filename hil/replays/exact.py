@@ -24,7 +24,7 @@ from hil.record.schema import FRAME_NAMES, SAMPLE_NAMES
 from hil.record.source import Source, load_plugins, read_source, recorded_scenario
 from hil.record.tlog import LoggedFrame
 from hil.replays.divergence import Channel, compare_columns, compare_link
-from hil.rigs.replay import open_replay
+from hil.rigs.replay import HAPPENED, open_replay
 from hil.runs.execute import RunSpec, board_parameters, make_parts
 from hil.runs.session import Ending, Session
 from hil.wire.identity import board_hashes
@@ -131,6 +131,8 @@ def replay(
         ending = Ending("fault", str(fault))
     record = recorder.close(ending.outcome, ending.detail)
     samples = record.samples
+    if not samples["t_s"].size:
+        _refuse_without_ticks(source)
     if shadow is not None:
         samples = samples | shadow.columns(parts.geometry.wheels, samples["t_s"].size)
     stamps = [
@@ -153,10 +155,20 @@ def replay(
     )
 
 
+def _refuse_without_ticks(source: Source) -> None:
+    """Raise BadInput when the run ended before its first tick: there is nothing to reproduce."""
+    if not source.samples or not source.samples["t_s"].size:
+        why = source.manifest.outcome_detail or source.manifest.outcome
+        raise BadInput(
+            f"{source.path}: has no tick: the run ended before its first one ({why}); nothing to "
+            "replay"
+        )
+
+
 def _changed(recorded: Scenario, overrides: Sequence[str]) -> Scenario:
     """Return the scenario of a shadow; what the record alone decides cannot be changed."""
     changed = with_overrides(recorded, overrides)
-    for key in ("duration_s", "start", "mismatch", "disturbances", "faults"):
+    for key in HAPPENED:
         if getattr(changed, key) != getattr(recorded, key):
             raise BadInput(f"--set {key}: happened in the record and cannot be changed in a replay")
     if changed.control.rate_hz != recorded.control.rate_hz:

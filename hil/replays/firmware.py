@@ -20,7 +20,8 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from hil.board._firmware import BUILD_ID, TICK_US, Board, parameter_hash
-from hil.config.load import build, check_board, set_value
+from hil.config.limits import check_board
+from hil.config.load import build, set_value
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
 from hil.record import layout

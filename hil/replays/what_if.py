@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hil.analysis.metrics import BY_NAME, compute
+from hil.analysis.metrics import compute
 from hil.analysis.stats import Paired, paired
 from hil.config.load import with_overrides
 from hil.config.scenario import Scenario, StartPose
+from hil.core.figures import BY_NAME
 from hil.record.source import load_plugins, read_source, recorded_scenario
 from hil.replays.fit import UNITS, Fit, Rehearsal, fit_twin
 from hil.report.compare import HEADLINES

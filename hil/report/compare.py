@@ -11,8 +11,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from hil.analysis.metrics import BY_NAME, METRICS, Figures, Metric, Verdict, check
+from hil.analysis.metrics import Figures, Verdict, check
 from hil.core.errors import BadInput
+from hil.core.figures import BY_NAME, METRICS, Metric
+from hil.core.text import visible
 from hil.report.target_gap import tier_gap
 
 if TYPE_CHECKING:
@@ -66,10 +68,10 @@ class Comparison:
         return all(entry.holds for entry in self.entries)
 
 
-def compare_runs(runs: Sequence[RunRecord]) -> Comparison:
-    """Return the comparison of two or more runs; raises BadInput when their tasks differ."""
-    if len(runs) < 2:
-        raise BadInput(f"compare: {len(runs)} run given, at least 2 are needed")
+def compare_runs(runs: Sequence[RunRecord], least: int = 2) -> Comparison:
+    """Return the comparison of `least` or more runs; raises BadInput when their tasks differ."""
+    if len(runs) < least:
+        raise BadInput(f"compare: {len(runs)} run given, at least {least} are needed")
     for run in runs[1:]:
         refuse_other_task(runs[0], run)
     entries = tuple(_entry(label, run) for label, run in zip(labels(runs), runs, strict=True))
@@ -125,7 +127,7 @@ def _warnings(entries: Sequence[Entry]) -> list[str]:
         for key, here, there in differences(first.scenario, other.scenario):
             text = f"{key} {_short(there)} against {_short(here)} ({entries[0].label})"
             lines.append(f"{entry.label}: {text}")
-    bases = {entry.figures.basis for entry in entries}
+    bases = {entry.figures.basis for entry in entries if entry.run.samples["t_s"].size}
     if len(bases) > 1:
         lines.append("figures rest on the truth in some runs and on the estimate in others")
     return lines
@@ -133,7 +135,7 @@ def _warnings(entries: Sequence[Entry]) -> list[str]:
 
 def _flaws(entry: Entry) -> list[str]:
     manifest = entry.run.manifest
-    flaws = list(entry.run.problems)
+    flaws = [*entry.run.problems, *manifest.notes]
     if manifest.outcome in {"fault", "interrupted"}:
         detail = f" ({manifest.outcome_detail})" if manifest.outcome_detail else ""
         flaws.append(f"the run ended by {manifest.outcome}{detail}: figures cover what there is")
@@ -182,6 +184,8 @@ def _is_never(metric: Metric, value: float) -> bool:
 
 def findings(comparison: Comparison) -> list[str]:
     """Return plain sentences: who is better in each headline figure, by how much, how sure."""
+    if len(comparison.entries) == 1:
+        return ["One run: nothing to compare it with."]
     if any(not math.isfinite(entry.figures.values["ise_m2_s"]) for entry in comparison.entries):
         return ["An error is not finite in at least one run: nothing can be concluded."]
     lines, wins = [], dict.fromkeys((entry.label for entry in comparison.entries), 0)
@@ -258,11 +262,12 @@ def text_table(comparison: Comparison) -> Table:
 
     basis = " and ".join(sorted({entry.figures.basis for entry in comparison.entries}))
     table = Table(
-        title=f"{comparison.scenario_name}, errors from the {basis}", title_justify="left"
+        title=f"{shown_cell(comparison.scenario_name)}, errors from the {basis}",
+        title_justify="left",
     )
     table.add_column("figure")
     for entry in comparison.entries:
-        table.add_column(entry.label, justify="right")
+        table.add_column(shown_cell(entry.label), justify="right")
     table.add_column("unit")
     for metric in METRICS:
         values = [entry.figures.values[metric.name] for entry in comparison.entries]
@@ -275,3 +280,10 @@ def text_table(comparison: Comparison) -> Table:
     marks = ["[green]pass[/]" if entry.holds else "[red]fail[/]" for entry in comparison.entries]
     table.add_row("requirements", *marks, "")
     return table
+
+
+def shown_cell(text: str) -> str:
+    """Return a text of others for a cell of a terminal's table: shown as it was typed."""
+    from rich.markup import escape  # noqa: PLC0415 - terminals only
+
+    return escape(visible(text))

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hil.analysis.metrics import METRICS
 from hil.core.errors import BadInput
+from hil.core.figures import METRICS
 from hil.record.manifest import replace_file
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ import cv2
 import jinja2
 from markupsafe import Markup
 
-from hil.analysis.metrics import BY_NAME, METRICS
 from hil.core.errors import BadInput
+from hil.core.figures import BY_NAME, METRICS
 from hil.record.manifest import replace_file
 from hil.report import figures as draw
 from hil.report.assumptions import Assumption, assumptions, gain_assumptions
@@ -143,7 +143,8 @@ def _verdict_of_repeats(repeats: Sequence[Repeats]) -> str:
 
 
 def _basis_note(comparisons: Sequence[Comparison]) -> str:
-    bases = {entry.figures.basis for entry in _entries(comparisons)}
+    entries = [entry for entry in _entries(comparisons) if entry.run.samples["t_s"].size]
+    bases = {entry.figures.basis for entry in entries}
     told = {
         "truth": "Errors and paths rest on the simulated robot's true state.",
         "estimate": "Errors and paths rest on the estimated state: the truth is not known here.",
@@ -224,7 +225,9 @@ def _after(number: str) -> str:
 
 
 def _figures(comparison: Comparison) -> list[Context]:
-    runs = draw.traces(comparison.entries)
+    runs = [run for run in draw.traces(comparison.entries) if run.samples["t_s"].size]
+    if not runs:  # every run ended before its first tick
+        return []
     anchor = _anchor(comparison.scenario_name)
     path, error, control, _ = _THESIS.get(comparison.scenario_name, ("",) * 4)
     limits = [

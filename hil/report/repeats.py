@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hil.analysis.metrics import BY_NAME, METRICS, Metric
 from hil.analysis.stats import Adjusted, Paired, adjusted, paired
-from hil.report.compare import differences
+from hil.core.figures import BY_NAME, METRICS, Metric
+from hil.report.compare import differences, shown_cell
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -251,7 +251,7 @@ def text_tables(repeats: Repeats, figures: Sequence[str]) -> list[Table]:
 def _table(repeats: Repeats, contrast: Contrast, figures: Sequence[str]) -> Table:
     from rich.table import Table  # noqa: PLC0415 - terminals only
 
-    title = f"{repeats.scenario_name}: {contrast.name}, {len(repeats.seeds)} pairs"
+    title = shown_cell(f"{repeats.scenario_name}: {contrast.name}, {len(repeats.seeds)} pairs")
     table = Table(title=title, title_justify="left")
     for head in ("figure", "baseline", "other", "difference", "95 % interval", "effect", "unit"):
         table.add_column(head, justify="left" if head in {"figure", "unit"} else "right")

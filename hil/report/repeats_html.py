@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
-from hil.analysis.metrics import BY_NAME, METRICS
 from hil.analysis.stats import Paired
+from hil.core.figures import BY_NAME, METRICS
 from hil.report import figures as draw
 from hil.report.compare import HEADLINES
 from hil.report.repeats import Contrast, Repeats

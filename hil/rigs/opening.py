@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from hil.core.rig import Rig
 
 SIMULATED = ("twin", "pil")
+REPLAY = "replay:"
 
 
 def open_rig(target: str, scenario: Scenario, camera: str, seed: int) -> Rig:
@@ -32,12 +33,14 @@ def open_rig(target: str, scenario: Scenario, camera: str, seed: int) -> Rig:
 
         device, baud = parse_target(target)
         return SerialRig(device, baud, open_source(camera, scenario.camera))
-    if target.startswith("replay:"):
+    if target.startswith(REPLAY):
         from hil.record.source import read_source, recorded_scenario  # noqa: PLC0415
-        from hil.rigs.replay import open_replay  # noqa: PLC0415
+        from hil.rigs.replay import open_replay, refuse_other_task  # noqa: PLC0415
 
-        source = read_source(Path(target.removeprefix("replay:")))
-        return open_replay(source, recorded_scenario(source.manifest, source.path))
+        source = read_source(Path(target.removeprefix(REPLAY)))
+        recorded = recorded_scenario(source.manifest, source.path)
+        refuse_other_task(scenario, recorded, source.path)
+        return open_replay(source, recorded)
     raise BadInput(f"target {target!r}: unknown; choose twin, pil, serial:DEV[@BAUD] or replay:RUN")
 
 

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from hil.config.mismatch import true_robot
-from hil.core.errors import RigFault
+from hil.core.errors import BadInput, RigFault
 from hil.core.rig import Frame, Truth
 from hil.core.types import Pose, PoseMeasurement
 from hil.record import layout, tape
@@ -31,6 +31,9 @@ if TYPE_CHECKING:
     from hil.record.source import Source
 
 END = "replay: the record ends here"
+# What happened in a record, and what was asked there.
+HAPPENED = ("duration_s", "start", "mismatch", "disturbances", "faults")
+_TASK = ("name", "reference", *HAPPENED)
 
 
 class ReplayRig:
@@ -208,3 +211,16 @@ def open_replay(source: Source, recorded: Scenario) -> ReplayRig:
         recorded_frames(source.frames, images),
         recorded_truths(source.samples, true_robot(recorded).d0_m),
     )
+
+
+def refuse_other_task(scenario: Scenario, recorded: Scenario, path: Path) -> None:
+    """Raise BadInput when a record of another task is to answer for a scenario (`--on replay:`)."""
+    pairs = {key: (getattr(scenario, key), getattr(recorded, key)) for key in _TASK}
+    pairs["control.rate_hz"] = (scenario.control.rate_hz, recorded.control.rate_hz)
+    for key, (asked, there) in pairs.items():
+        if asked != there:
+            shown = f" ({asked} asked, {there} recorded)" if isinstance(asked, str | float) else ""
+            raise BadInput(
+                f"--on replay:{path}: is a record of another task: {key} differs{shown}; name its "
+                "scenario and what was --set there, or use hil replay"
+            )

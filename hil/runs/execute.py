@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -11,11 +12,15 @@ from typing import TYPE_CHECKING
 import cv2
 
 from hil.analysis.metrics import LinkStats
+from hil.config.fit import check_fit
+from hil.config.limits import wheel_speed_max_rad_s
 from hil.control.estimators.geometry import BelievedGeometry
 from hil.control.estimators.making import make_estimator
 from hil.control.laws.hold import HoldAtGoal
 from hil.control.laws.making import make_outer_law
+from hil.control.laws.within import WithinWheelSpeed
 from hil.control.references import make_reference
+from hil.control.task_notes import notes
 from hil.core.clocks import CameraClock
 from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES
 from hil.core.registry import BUILT_IN
@@ -24,7 +29,7 @@ from hil.record.memory import MemoryRecorder
 from hil.record.recorder import Recorder
 from hil.record.tape import TapedRig
 from hil.record.timeline import Timeline
-from hil.rigs.opening import SIMULATED, open_rig
+from hil.rigs.opening import REPLAY, SIMULATED, open_rig
 from hil.runs.interruption import CtrlC
 from hil.runs.law_guard import GuardedLaw
 from hil.runs.session import Parts, Progress, Publish, Session
@@ -66,9 +71,18 @@ def exit_status(record: RunRecord) -> int:
     return 0 if all(verdict.holds for verdict in record.verdicts()) else 1
 
 
+def judged_status(records: Iterable[RunRecord]) -> int:
+    """Return the exit status of a command that looks at recorded runs.
+
+    As a run's own, the gravest of all; but a record that was stopped by Ctrl-C or cut off has failed
+    its requirements (1): this command was not stopped.
+    """
+    return max(3 if r.manifest.outcome == "fault" else min(exit_status(r), 1) for r in records)
+
+
 def camera_for(scenario: Scenario, target: str, asked: str | None) -> str:
     """Return the camera asked for, or the target's default one."""
-    if target.startswith("replay:"):
+    if target.startswith(REPLAY):
         return "as recorded"
     return asked or (scenario.camera_source if target in SIMULATED else "0")
 
@@ -96,6 +110,7 @@ def execute(
     estimate of every tick.
     """
     cv2.setNumThreads(1)  # search windows are small: handing them to threads costs more
+    check_fit(spec.scenario)
     parameters = board_parameters(spec.scenario, spec.inner)
     law = make_law(spec)
     rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
@@ -125,6 +140,7 @@ def execute_in_memory(spec: RunSpec, rig: Rig | None = None) -> RunRecord:
 
     `rig` is another one than the spec's target names; it is closed here.
     """
+    check_fit(spec.scenario)
     parameters = board_parameters(spec.scenario, spec.inner)
     law = make_law(spec)
     rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
@@ -186,7 +202,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
         camera_clock=CameraClock(scenario.camera.latency_s),
         localiser=LOCALISERS.get(scenario.camera.localiser).factory(scenario.camera),
         estimator=make_estimator(control.estimator, control.fusion, geometry),
-        law=law or make_law(spec),
+        law=WithinWheelSpeed(law or make_law(spec), geometry, wheel_speed_max_rad_s(scenario)),
         reference=make_reference(scenario.reference),
         geometry=geometry,
         recorder=recorder,
@@ -213,6 +229,8 @@ def make_manifest(spec: RunSpec) -> Manifest:
             "board": board_parameters(spec.scenario, spec.inner),
         },
         plugins=plugins_of(spec),
+        open_loop_of=spec.target.removeprefix(REPLAY) if spec.target.startswith(REPLAY) else "",
+        notes=notes(spec.scenario),
         versions=collect_versions(),
         git_revision=git_revision(),
         start_time_utc=datetime.fromtimestamp(now_us * 1e-6, UTC).isoformat(timespec="seconds"),

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Literal
 from hil.core.errors import RigFault
 from hil.record.tick_rows import sample_row
 from hil.wire import handshake
+from hil.wire.refusal import refused_set_point
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
@@ -89,6 +90,7 @@ class Session:
         self._dialect_hash = self._parameter_hash = 0
         self._may_move = False
         self._texts_noted = 0
+        self._refusal = ""
         self._report: WheelReport | None = None
         self._measurement: PoseMeasurement | None = None
         self._pose_time_s = self._pose_time_recorded_s = -math.inf
@@ -261,6 +263,7 @@ class Session:
         self._texts_noted = link.texts_heard
         for text in list(link.texts)[-new:]:
             self._note("board", text.text)
+            self._refusal = self._refusal or refused_set_point(text)
 
     def _take_frame(self, frame: Frame, now_s: float) -> None:
         """Localise one frame and hand the pose to the estimator at its exposure time."""
@@ -287,6 +290,8 @@ class Session:
     def _check_safety(self, now_s: float) -> None:
         """Raise RigFault when the host itself must stop the robot."""
         safety, link = self._scenario.safety, self._parts.link
+        if self._refusal:
+            raise RigFault(f"board: {self._refusal}")
         if not link.armed:
             raise RigFault(f"board: left ARMED by itself: {link.state_name}")
         silent_s = now_s - (self._report.t_arrival_s if self._report else -math.inf)

@@ -14,6 +14,7 @@ from queue import Empty
 from random import Random
 from typing import TYPE_CHECKING, Any
 
+from hil.config.fit import check_fit
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput
 from hil.record import layout
@@ -68,6 +69,9 @@ def deck_specs(deck: Deck, conditions: Conditions, folder: Path) -> list[RunSpec
     wears, so each repeat is a block in which the order is drawn, by `conditions.seed`.
     """
     scenarios = [load_scenario(name, conditions.overrides) for name in deck.scenarios]
+    for scenario in scenarios:
+        check_fit(scenario)
+    _refuse_one_name_twice(deck, [scenario.name for scenario in scenarios])
     arms = [
         (scenario, law, inner)
         for scenario in scenarios
@@ -97,6 +101,21 @@ def deck_specs(deck: Deck, conditions: Conditions, folder: Path) -> list[RunSpec
                 )
             )
     return specs
+
+
+def _refuse_one_name_twice(deck: Deck, names: Sequence[str]) -> None:
+    """Raise BadInput when two scenarios have one name: their records would share a folder.
+
+    Names that differ in case only share it too, on some file systems.
+    """
+    seen: dict[str, str] = {}
+    for file, name in zip(deck.scenarios, names, strict=True):
+        if name.casefold() in seen:
+            raise BadInput(
+                f"deck: scenarios {seen[name.casefold()]!r} and {file!r} are both named {name!r}; "
+                "give each file a name of its own (key name)"
+            )
+        seen[name.casefold()] = file
 
 
 def claim(folder: Path, specs: Sequence[RunSpec]) -> list[RunSpec]:
@@ -240,14 +259,14 @@ class Study:
         return to_json(self.comparison) | {"statistics": statistics}
 
 
-def study(runs: Sequence[RunRecord]) -> Study:
-    """Return the study of runs of one scenario; raises BadInput when their tasks differ.
+def study(runs: Sequence[RunRecord], least: int = 2) -> Study:
+    """Return the study of `least` or more runs of one scenario; BadInput when their tasks differ.
 
     With repeats, the runs side by side are those of the first seed that all arms have.
     """
     repeats = repeats_of(runs)
     if repeats is None:
-        return Study(compare_runs(runs), None)
+        return Study(compare_runs(runs, least), None)
     for run in runs[1:]:
         refuse_other_task(runs[0], run)
     first = [run for run in runs if run.manifest.seed == repeats.seeds[0]]
@@ -259,7 +278,7 @@ def study_by_scenario(records: Sequence[RunRecord]) -> list[Study]:
     groups: dict[str, list[RunRecord]] = {}
     for record in records:
         groups.setdefault(record.manifest.scenario_name, []).append(record)
-    return [study(group) for group in groups.values()]
+    return [study(group, least=1) for group in groups.values()]
 
 
 def circle_study() -> CircleStudy:

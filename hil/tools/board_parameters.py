@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from hil.config.load import check_board
+from hil.config.limits import check_board
 from hil.core.errors import BadInput
 from hil.record.manifest import replace_file
 from hil.rigs.serial import SerialRig, parse_target
@@ -71,7 +71,7 @@ def read_file(path: Path) -> dict[str, float]:
     """Return the [board] table of a file; raises BadInput."""
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8")).get("board")
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise BadInput(f"{path}: not a readable parameter file: {error}") from None
     if not isinstance(table, dict) or not all(
         isinstance(value, int | float) for value in table.values()

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from hil.config.deck import load_deck
-from hil.config.load import builtin_names, load_scenario, merge, unit_of
+from hil.config.load import builtin_names, load_scenario, merge
 from hil.core.errors import BadInput
 
 MINIMAL = """
@@ -59,6 +59,12 @@ def test_set_reaches_scenario_robot_link_and_board_values() -> None:
     )
     assert changed.robot.wheel_radius_m == plain.robot.wheel_radius_m
     assert plain.robot.mass_kg != 3.1
+
+
+def test_a_whole_table_of_the_board_still_sets_every_parameter() -> None:
+    """What is not named has its default: a run does not depend on what the board had stored."""
+    table = load_scenario("scenario-1", ["board={ISM_K0=0.2}"])
+    assert table == load_scenario("scenario-1", ["board.ISM_K0=0.2"])
 
 
 def test_unknown_name_lists_near_names() -> None:
@@ -128,10 +134,3 @@ def test_table_of_another_kind_replaces_the_one_below() -> None:
     assert merge(below, {"reference": {"y_m": 2.0}})["reference"] == {
         "kind": "point", "x_m": 1.0, "y_m": 2.0,
     }  # fmt: skip
-
-
-def test_units_are_read_from_names() -> None:
-    """The longest suffix counts: m_s2 is an acceleration, not seconds squared."""
-    assert unit_of("zeta_max_m_s2") == "m/s^2"
-    assert unit_of("mass_kg") == "kg"
-    assert unit_of("p") == ""

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from hil.analysis import metrics
-from hil.analysis.metrics import METRICS, LinkStats
+from hil.analysis.metrics import LinkStats
+from hil.core import figures as figure_table
 from hil.core.errors import BadInput
+from hil.core.figures import METRICS
 from hil.record.schema import SAMPLE_NAMES
 
 T_S = np.linspace(0.0, 10.0, 1001)
@@ -177,6 +179,6 @@ def test_side_and_turn_are_checked_by_sign():
 def test_unknown_figure_and_short_record_are_bad_input():
     """A misspelt figure lists near names; a record of one tick has no figures."""
     with pytest.raises(BadInput, match=r"near: .*settling_20mm_s"):
-        metrics.require_known("settling_20_s")
+        figure_table.require_known("settling_20_s")
     with pytest.raises(BadInput, match="1 rows of samples"):
         metrics.compute({name: np.zeros(1) for name in SAMPLE_NAMES})

@@ -8,8 +8,8 @@ import math
 import pytest
 from rich.console import Console
 
-from hil.analysis.metrics import BY_NAME
 from hil.core.errors import BadInput
+from hil.core.figures import BY_NAME
 from hil.report.compare import (
     better_of,
     compare_runs,

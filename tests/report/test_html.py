@@ -12,9 +12,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from hil.analysis.metrics import METRICS
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput
+from hil.core.figures import METRICS
 from hil.report.assumptions import assumptions, gain_assumptions
 from hil.report.circle import CircleStudy
 from hil.report.compare import compare_runs

@@ -10,8 +10,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from hil.analysis.metrics import METRICS
 from hil.core.errors import BadInput, RigFault
+from hil.core.figures import METRICS
 from hil.runs.execute import RunSpec, execute
 from hil.study.campaign.findings import documents, outcomes_of, sentences
 from hil.study.campaign.maps import write_page

@@ -73,7 +73,7 @@ def _read_text(path: Path) -> str:
 def _parse(text: str, path: Path) -> CameraConfig:
     try:
         tree = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise BadInput(f"{path}: not valid TOML: {error}") from None
     return build(CameraConfig, tree, str(path))
 

@@ -9,9 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from pydantic import Field
-
-from hil.config.base import Section
+from hil.config.base import Section, quantity
 from hil.control.laws.chain import Chain, ChainState, restrict
 from hil.control.laws.trace import make_trace
 from hil.core.registries import OUTER_LAWS
@@ -26,17 +24,17 @@ _SMALL = 1e-3
 
 
 class AsgIsmGains(Section):
-    """Gains of backstepping with ASG-ISM (8.6)-(8.22), control.md section 2."""
+    """Gains of backstepping with ASG-ISM (8.6)-(8.22), docs/control.md."""
 
-    k1_s: float = Field(gt=0, le=100, description="1/s at p = 1, position error to speed")
-    k2_s: float = Field(gt=0, le=100, description="1/s at p = 1, speed error to acceleration")
-    p: float = Field(1.0, ge=1, le=3, description="exponent 1 + epsilon of (8.6), (8.11)")
-    alpha_m_s3: float = Field(ge=0, le=1e4, description="m/s^3, gain of the sliding term")
-    eps0_m_s2: float = Field(0.0, ge=0, le=100, description="m/s^2, layer eps0/(t+mu0)^(1+beta)")
-    beta: float = Field(0.5, gt=0, lt=1, description="rate at which the layer shrinks, (4.20)")
-    eps_min_m_s2: float = Field(gt=0, le=100, description="m/s^2, floor of the layer")
-    mu0_s: float = Field(gt=0, le=100, description="s, mu = 1/(t + mu0)")
-    sigma_m_s2: float = Field(ge=0, le=100, description="m/s^2, scale of the cost H in Psi")
+    k1_s: float = quantity("1/s", "at p = 1, position error to speed", gt=0, le=100)
+    k2_s: float = quantity("1/s", "at p = 1, speed error to acceleration", gt=0, le=100)
+    p: float = quantity("", "exponent 1 + epsilon of (8.6), (8.11)", 1.0, ge=1, le=3)
+    alpha_m_s3: float = quantity("m/s^3", "gain of the sliding term", ge=0, le=1e4)
+    eps0_m_s2: float = quantity("m/s^2", "layer eps0/(t+mu0)^(1+beta)", 0.0, ge=0, le=100)
+    beta: float = quantity("", "rate at which the layer shrinks, (4.20)", 0.5, gt=0, lt=1)
+    eps_min_m_s2: float = quantity("m/s^2", "floor of the layer", gt=0, le=100)
+    mu0_s: float = quantity("s", "mu = 1/(t + mu0)", gt=0, le=100)
+    sigma_m_s2: float = quantity("m/s^2", "scale of the cost H in Psi", ge=0, le=100)
 
 
 # Bounds and start of a search: poles at -1, -2, -3 to begin with, as for every law (inside its layer

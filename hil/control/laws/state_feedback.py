@@ -10,9 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pydantic import Field
-
-from hil.config.base import Section
+from hil.config.base import Section, quantity
 from hil.control.laws.chain import Chain, authority, restrict
 from hil.control.laws.trace import make_trace
 from hil.core.registries import OUTER_LAWS
@@ -26,12 +24,12 @@ _ZERO = (0.0, 0.0)
 
 
 class PidGains(Section):
-    """Gains of the state feedback in PID form on the linearised chain (control.md section 2)."""
+    """Gains of the state feedback in PID form on the linearised chain (docs/control.md)."""
 
-    kp_s3: float = Field(gt=0, le=1e6, description="1/s^3, on delta1")
-    ki_s4: float = Field(0.0, ge=0, le=1e6, description="1/s^4, on the integral of delta1")
-    kd1_s2: float = Field(gt=0, le=1e6, description="1/s^2, on d delta1/dt")
-    kd2_s: float = Field(gt=0, le=1e4, description="1/s, on d2 delta1/dt2")
+    kp_s3: float = quantity("1/s^3", "on delta1", gt=0, le=1e6)
+    ki_s4: float = quantity("1/s^4", "on the integral of delta1", 0.0, ge=0, le=1e6)
+    kd1_s2: float = quantity("1/s^2", "on d delta1/dt", gt=0, le=1e6)
+    kd2_s: float = quantity("1/s", "on d2 delta1/dt2", gt=0, le=1e4)
 
 
 # Bounds and start of a search: poles at -1, -2, -3 to begin with, as for every law.

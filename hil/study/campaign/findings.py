@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hil.analysis.metrics import BY_NAME
 from hil.analysis.stats import Interval, Paired, paired, t_interval
+from hil.core.figures import BY_NAME
 from hil.report.repeats import Arm, arm_names, law_rank
 from hil.study.campaign.plan import HOLDS, Campaign, metric_of
 

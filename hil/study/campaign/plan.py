@@ -15,12 +15,13 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from hil.analysis.metrics import BY_NAME, Metric, require_known
-from hil.config.base import Section
+from hil.config.base import PlainName, Section
 from hil.config.control import OuterLawName
-from hil.config.load import build, check_board, load_scenario, put_value, read_tree
+from hil.config.limits import check_board
+from hil.config.load import build, load_scenario, put_value, read_tree
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
+from hil.core.figures import BY_NAME, Metric, require_known
 
 Point = dict[str, Any]
 InnerLawName = Literal["asg-ism", "pid"]
@@ -100,7 +101,7 @@ Axis = Annotated[Range | list[Any], Field(union_mode="left_to_right")]
 class CampaignFile(Section):
     """A campaign: the grid's points x draws x seeds x laws; draws and seeds are common to all."""
 
-    name: str = Field(min_length=1, max_length=80)
+    name: PlainName = Field(min_length=1, max_length=80, description="names the results' folder")
     scenario: str = Field(description="built-in name or TOML file")
     set: tuple[str, ...] = Field((), description="KEY=VALUE in force in every run")
     target: Literal["twin", "pil"] = "twin"

@@ -16,8 +16,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from hil.analysis.metrics import METRICS
 from hil.core.errors import BadInput
+from hil.core.figures import METRICS
 from hil.record.manifest import replace_file
 from hil.study.campaign.plan import Campaign, Job
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hil.config.fit import check_fit
 from hil.core.errors import BadInput
 from hil.study.campaign.plan import Campaign, Job
 from hil.study.campaign.results import ResultStore, Row, row_of
@@ -66,6 +67,7 @@ def run_job(campaign: Campaign, job: Job) -> Row:
 
     try:
         scenario = campaign.scenario(job.point)
+        check_fit(scenario)
     except BadInput as error:  # a combination of values, each of them allowed by itself
         return row_of(job, "refused", str(error), False, 0.0, [])
     file = campaign.file

@@ -1,0 +1,50 @@
+"""Limits that must fit together: of the host's loop, the robot's geometry and the board's parameters.
+
+The board's bounds come from its own table (firmware_arduino/src/core/params.def, compiled in), so
+none is stated twice. What cannot fit is refused before anything moves; what the host can ask beyond
+the board's bound on wheel speed is scaled to it (`hil.control.laws.within`).
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from functools import cache
+from typing import TYPE_CHECKING
+
+from hil.board._firmware import Parameter, parameter_table
+from hil.core.errors import BadInput
+
+if TYPE_CHECKING:
+    from hil.config.scenario import Scenario
+
+
+@cache
+def board_table() -> Mapping[str, Parameter]:
+    """Return every parameter of the board by its name, in the board's order."""
+    return {entry.name: entry for entry in parameter_table()}
+
+
+def board_defaults() -> dict[str, float]:
+    """Return every parameter of the board with the default its firmware has."""
+    return {name: entry.default for name, entry in board_table().items()}
+
+
+def check_board(values: Mapping[str, float]) -> None:
+    """Raise BadInput for a board parameter that does not exist or lies outside its bounds."""
+    table = board_table()
+    for name, value in values.items():
+        entry = table.get(name)
+        if entry is None:
+            near = difflib.get_close_matches(name, table, n=3, cutoff=0.5) or list(table)
+            raise BadInput(f"board.{name}: no such parameter of the board; near: {', '.join(near)}")
+        if not entry.minimum <= value <= entry.maximum:
+            raise BadInput(
+                f"board.{name} = {value:g} {entry.unit}: allowed are {entry.minimum:g} to "
+                f"{entry.maximum:g} {entry.unit}".rstrip()
+            )
+
+
+def wheel_speed_max_rad_s(scenario: Scenario) -> float:
+    """Return the largest wheel speed that the board accepts as a set-point."""
+    return scenario.board.get("W_MAX", board_table()["W_MAX"].default)
