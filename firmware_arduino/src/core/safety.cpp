@@ -21,6 +21,7 @@ constexpr SafetyRule RULES[] = {
 
 constexpr uint8_t WINDOW_TICKS = 250;  // one second
 constexpr float TICKS_PER_MS = 1000.0f / TICK_US;
+constexpr float TWO_PI_RAD = 6.2831853f;
 
 // Counts ticks in a row; true once `limit` is reached.
 bool lasts(uint16_t& ticks, bool holds, uint16_t limit) {
@@ -43,10 +44,35 @@ bool runs_away(uint16_t& ticks, const SideView& v, const SafetyLimits& limits) {
   return lasts(ticks, lost, limits.runaway_ticks);
 }
 
-bool stalls(uint16_t& ticks, const SideView& v, const SafetyLimits& limits) {
+// Whether the wheel has got on by two counts, either way, since it last did.
+bool gets_on(Stall& s, int16_t moved_counts) {
+  constexpr int16_t FLICKER_COUNTS = 1;
+  if (moved_counts > FLICKER_COUNTS || moved_counts < -FLICKER_COUNTS) return true;
+  s.net_counts = static_cast<int16_t>(s.net_counts + moved_counts);
+  return s.net_counts > FLICKER_COUNTS || s.net_counts < -FLICKER_COUNTS;
+}
+
+void fade(Stall& s) {
+  if (s.remembered == 0 || (++s.fade & 3u) != 0) return;
+  --s.remembered;
+}
+
+bool stalls(Stall& s, const SideView& v, const SafetyLimits& limits) {
   const bool pushed = v.pwm >= limits.stall_pwm || v.pwm <= -limits.stall_pwm;
   const bool asked = fabsf(v.setpoint_rad_s) >= limits.stall_setpoint_rad_s;
-  return lasts(ticks, (pushed || asked) && v.moved_counts == 0, limits.stall_ticks);
+  const bool on = gets_on(s, v.moved_counts);
+  fade(s);
+  if (on || !(pushed || asked)) {
+    if (on && s.ticks >= limits.pause_ticks) s.remembered = static_cast<uint16_t>(s.remembered + s.ticks);
+    s.net_counts = 0;
+    s.ticks = 0;
+    return false;
+  }
+  if (s.ticks < limits.stall_ticks) ++s.ticks;
+  const bool again = s.ticks >= limits.pause_ticks && s.ticks + s.remembered >= limits.stall_ticks;
+  if (s.ticks < limits.stall_ticks && !again) return false;
+  s.remembered = 0;
+  return true;
 }
 
 void check_battery(Safety& s, const SafetyLimits& limits, uint16_t battery_mv) {
@@ -67,6 +93,14 @@ void check_encoder(Safety& s, const SafetyLimits& limits, uint16_t illegal_total
     s.illegal_at_window = illegal_total;
     s.window_ticks = 0;
   }
+}
+
+// A pause of a sound wheel between two counts, and the start of one against friction, are shorter than this.
+float pause_ticks(const Params& p) {
+  constexpr float START_TICKS = 25.0f;
+  constexpr float CRAWL_RAD_S = 0.5f;
+  const float two_counts = 2.0f * TWO_PI_RAD / (p.enc_counts_per_turn * CRAWL_RAD_S * TICK_S);
+  return fmaxf(fmaxf(START_TICKS, two_counts), 0.25f * p.stall_ms * TICKS_PER_MS);
 }
 
 uint16_t ticks_of(float ms) { return static_cast<uint16_t>(ms * TICKS_PER_MS + 0.5f); }
@@ -95,6 +129,7 @@ SafetyLimits safety_limits(const Params& p) {
       ? static_cast<uint16_t>((p.battery_low_v + p.battery_hysteresis_v) * 1000.0f + 0.5f) : 0;
   l.battery_ticks = ticks_of(p.battery_debounce_ms);
   l.stall_ticks = ticks_of(p.stall_ms);
+  l.pause_ticks = static_cast<uint16_t>(pause_ticks(p));
   l.runaway_ticks = ticks_of(p.runaway_ms);
   l.overspeed_ticks = ticks_of(p.overspeed_ms);
   l.stall_pwm = static_cast<int16_t>(p.stall_duty * PWM_TOP);
@@ -103,6 +138,7 @@ SafetyLimits safety_limits(const Params& p) {
   l.runaway_error_rad_s = p.runaway_error_rad_s;
   l.overspeed_rad_s = p.overspeed_rad_s;
   l.illegal_per_s = static_cast<uint16_t>(p.illegal_per_s);
+  l.edges_too_fast = p.enc_counts_per_turn * p.overspeed_rad_s > ENCODER_COUNTS_1_S * TWO_PI_RAD;
   return l;
 }
 
@@ -121,7 +157,7 @@ Conditions safety_check(Safety& s, const SafetyLimits& limits, const SafetyView&
     if (lasts(s.overspeed_ticks[i], fast, limits.overspeed_ticks)) {
       now |= condition(HIL_REASON_OVERSPEED_LEFT + i);
     }
-    if (stalls(s.stall_ticks[i], side, limits)) now |= condition(HIL_REASON_STALL_LEFT + i);
+    if (stalls(s.stall[i], side, limits)) now |= condition(HIL_REASON_STALL_LEFT + i);
   }
   check_encoder(s, limits, view.illegal_total);
   check_battery(s, limits, view.battery_mv);
