@@ -56,6 +56,18 @@ def test_interrupts_are_never_off_for_long(cost):
     assert 30 < cost.interrupts_off_cycles <= INTERRUPTS_OFF_CYCLES
 
 
+def test_no_frame_takes_longer_than_a_tick_leaves(cost):
+    """The longest tick and the costliest frame together fit into a tick, with a quarter to spare."""
+    assert 100 < min(cost.frames.us.values())
+    assert cost.frames.costliest_us <= MARGIN * 1500, cost.frames.us
+    assert cost.longest_tick_us + cost.frames.costliest_us <= 0.75 * 4000
+
+
+def test_a_flood_of_frames_makes_no_tick_late(cost):
+    """PARAM_SETs at line rate while armed, defaults ordered a hundred times a second: no overrun."""
+    assert (cost.frames.overruns, cost.frames.bad_frames) == (0, 0)
+
+
 def test_the_longest_tick_leaves_room(cost):
     """The board's own account of its longest tick, interrupts during it included."""
     assert 500 < cost.longest_tick_us < 0.6 * 4000

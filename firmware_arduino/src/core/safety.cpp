@@ -53,7 +53,7 @@ bool gets_on(Stall& s, int16_t moved_counts) {
 }
 
 void fade(Stall& s) {
-  if (s.remembered == 0 || (++s.fade & 3u) != 0) return;
+  if (s.remembered == 0 || (++s.fade & 7u) != 0) return;
   --s.remembered;
 }
 

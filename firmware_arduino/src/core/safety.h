@@ -56,7 +56,7 @@ struct SideView {
 struct Stall {
   int16_t net_counts;   // since the wheel last got on
   uint16_t ticks;       // driven ticks since then
-  uint16_t remembered;  // of earlier pauses; fades at a quarter of the rate, so that a loose contact adds up
+  uint16_t remembered;  // of earlier pauses; fades at an eighth of the rate, so that a loose contact adds up
   uint8_t fade;
 };
 
