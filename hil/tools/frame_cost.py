@@ -59,10 +59,12 @@ class FrameCost:
     """`us` is processor time a frame, parse, answer and serial interrupts included.
 
     A flood is a PARAM_SET at line rate: `overruns` are the ticks it made late, armed and driving under
-    changes and disarmed under orders to take the defaults, `bad_frames` those it cost.
+    changes and disarmed under orders to take the defaults, `bad_frames` those it cost. `latest_us` is how
+    much after its time a tick began at the most, of the fifth of them that are reported.
     """
 
     us: dict[str, float]
+    latest_us: int
     overruns: int
     bad_frames: int
 
@@ -77,6 +79,7 @@ class _Flooded:
 
     def __init__(self, rig: Pil, link: BoardLink) -> None:
         self.rig, self.link = rig, link
+        self.latest_us = 0
 
     def drive(self, seconds: float, say: Say | None = None, rate_hz: int = _RATE_HZ) -> float:
         """Drive, with frames at `rate_hz`; return the processor's time awake in s."""
@@ -108,7 +111,8 @@ class _Flooded:
     def _listen(self, until_s: float) -> None:
         while self.rig.now_s() < until_s:
             self.rig.wait(until_s)
-            self.link.poll(self.rig.now_s())
+            for report in self.link.poll(self.rig.now_s()):
+                self.latest_us = max(self.latest_us, report.wire.t_mcu_us % _firmware.TICK_US)
 
 
 def measure_frames(rig: Pil, link: BoardLink) -> FrameCost:
@@ -127,4 +131,4 @@ def measure_frames(rig: Pil, link: BoardLink) -> FrameCost:
     bench.drive(1.0, lambda link, _: link.send_command(storage, 0, 2.0), 100)
     bench.drive(1.0)
     after = bench.counts()
-    return FrameCost(us, after[0] - before[0], after[1] - before[1])
+    return FrameCost(us, bench.latest_us, after[0] - before[0], after[1] - before[1])
