@@ -87,6 +87,7 @@ _REASONS = {
     errno.EPERM: "no permission; add yourself to the group dialout and log in again",
     errno.EBUSY: "in use by another program; close it first",
     errno.EAGAIN: "in use by another program; close it first",
+    errno.EISDIR: "not a serial port; `hil doctor` lists the ports",
     errno.ENOTTY: "not a serial port; `hil doctor` lists the ports",
     errno.EIO: "gone while in use; was it unplugged or switched off?",
     errno.ENXIO: "gone while in use; was it unplugged or switched off?",
