@@ -179,9 +179,13 @@ def test_a_reset_in_mid_save_keeps_the_parameters_before(share):
     while not drive.link.acks:
         drive.wait(0.005)
     drive.twin.begin(drive.twin.now_s())
-    with pytest.raises(RigFault, match="was reset before its parameters were stored"):
+
+    def wait_for_the_end() -> None:
         while drive.link.busy:
             drive.wait(0.02)
+
+    with pytest.raises(RigFault, match="was reset before its parameters were stored"):
+        wait_for_the_end()
     handshake.finish(drive.link, drive.twin, handshake.download_parameters(drive.link))
     assert drive.link.parameters["PID_KP"] == pytest.approx(0.1)
     assert "last save was cut short, the one before in force" in drive.texts
