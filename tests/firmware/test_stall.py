@@ -58,6 +58,23 @@ def test_a_loose_contact_adds_up(kind, dead_s, sound_s, asked):
     assert stopped.reason == STALL["right"], name(stopped.reason)
 
 
+@pytest.mark.parametrize("kind", ["swapped_phases", "motor_reversed"])
+@pytest.mark.parametrize(("wrong_s", "sound_s"), [(0.25, 0.1), (0.25, 0.25), (0.2, 0.2)])
+@pytest.mark.parametrize("asked", [1.0, 5.0, -5.0])
+def test_a_wheel_that_runs_the_wrong_way_now_and_then_adds_up(kind, wrong_s, sound_s, asked):
+    """Wrong for less than RUN_MS at a time, again and again: RUNAWAY before 2 s are over."""
+    period_s = wrong_s + sound_s
+    faults = tuple(
+        Fault(kind=kind, side="left", start_s=start_s, end_s=start_s + wrong_s)
+        for start_s in (0.5 + period_s * i for i in range(math.ceil(2.5 / period_s)))
+    )
+    drive = armed(faults=faults)
+    drive.run(0.5, asked, asked)
+    stopped = first(drive.run(2.0, asked, asked), _is_safe)
+    assert stopped is not None
+    assert stopped.reason == dialect.HIL_REASON_RUNAWAY_LEFT, name(stopped.reason)
+
+
 def test_one_short_failure_is_forgotten():
     """Dead for 0.35 s every 4 s: no stall, the robot goes on."""
     faults = tuple(

@@ -33,46 +33,55 @@ bool lasts(uint16_t& ticks, bool holds, uint16_t limit) {
   return holds && ticks >= limit;
 }
 
+void fade(Tally& t) {
+  if (t.remembered == 0 || (++t.fade & 7u) != 0) return;
+  --t.remembered;
+}
+
+// As lasts(); besides, times of at least `worth` ticks add up.
+bool adds_up(Tally& t, bool holds, uint16_t limit, uint16_t worth) {
+  if (!holds) {
+    if (t.ticks >= worth) t.remembered = static_cast<uint16_t>(t.remembered + t.ticks);
+    t.ticks = 0;
+    return false;
+  }
+  if (t.ticks < limit) ++t.ticks;
+  const bool again = t.ticks >= worth && t.ticks + t.remembered >= limit;
+  if (t.ticks < limit && !again) return false;
+  t.remembered = 0;
+  return true;
+}
+
 bool against(const SideView& v) { return (v.pwm > 0) == (v.moved_counts < 0); }
 
-// A wheel with counts neither way keeps its tally: at a crawl most ticks see no count.
-bool runs_away(uint16_t& ticks, const SideView& v, const SafetyLimits& limits) {
+// A wheel with counts neither way keeps its tally: at a crawl most ticks see no count. A sound wheel that is
+// reversed runs against its duty for 40 ms.
+bool runs_away(Tally& t, const SideView& v, const SafetyLimits& limits) {
   const bool pushed = v.pwm >= limits.runaway_pwm || v.pwm <= -limits.runaway_pwm;
+  fade(t);
   if (pushed && v.moved_counts == 0) return false;
   const bool lost = pushed && against(v) &&
                     fabsf(v.omega_rad_s - v.setpoint_rad_s) >= limits.runaway_error_rad_s;
-  return lasts(ticks, lost, limits.runaway_ticks);
+  return adds_up(t, lost, limits.runaway_ticks, limits.runaway_ticks / 3);
 }
 
 // Whether the wheel has got on by two counts, either way, since it last did.
-bool gets_on(Stall& s, int16_t moved_counts) {
+bool gets_on(int16_t& net_counts, int16_t moved_counts) {
   constexpr int16_t FLICKER_COUNTS = 1;
   if (moved_counts > FLICKER_COUNTS || moved_counts < -FLICKER_COUNTS) return true;
-  s.net_counts = static_cast<int16_t>(s.net_counts + moved_counts);
-  return s.net_counts > FLICKER_COUNTS || s.net_counts < -FLICKER_COUNTS;
+  net_counts = static_cast<int16_t>(net_counts + moved_counts);
+  return net_counts > FLICKER_COUNTS || net_counts < -FLICKER_COUNTS;
 }
 
-void fade(Stall& s) {
-  if (s.remembered == 0 || (++s.fade & 7u) != 0) return;
-  --s.remembered;
-}
-
-bool stalls(Stall& s, const SideView& v, const SafetyLimits& limits) {
+bool stalls(Tally& t, int16_t& net_counts, const SideView& v, const SafetyLimits& limits) {
   const bool pushed = v.pwm >= limits.stall_pwm || v.pwm <= -limits.stall_pwm;
   const bool asked = fabsf(v.setpoint_rad_s) >= limits.stall_setpoint_rad_s;
-  const bool on = gets_on(s, v.moved_counts);
-  fade(s);
-  if (on || !(pushed || asked)) {
-    if (on && s.ticks >= limits.pause_ticks) s.remembered = static_cast<uint16_t>(s.remembered + s.ticks);
-    s.net_counts = 0;
-    s.ticks = 0;
-    return false;
-  }
-  if (s.ticks < limits.stall_ticks) ++s.ticks;
-  const bool again = s.ticks >= limits.pause_ticks && s.ticks + s.remembered >= limits.stall_ticks;
-  if (s.ticks < limits.stall_ticks && !again) return false;
-  s.remembered = 0;
-  return true;
+  const bool on = gets_on(net_counts, v.moved_counts);
+  const bool driven = pushed || asked;
+  fade(t);
+  if (on || !driven) net_counts = 0;
+  if (!on && !driven) t.ticks = 0;  // nobody asks: that says nothing about the encoder
+  return adds_up(t, driven && !on, limits.stall_ticks, limits.pause_ticks);
 }
 
 void check_battery(Safety& s, const SafetyLimits& limits, uint16_t battery_mv) {
@@ -153,11 +162,11 @@ Conditions safety_check(Safety& s, const SafetyLimits& limits, const SafetyView&
   for (uint8_t i = 0; i < SIDES; ++i) {
     const SideView& side = view.side[i];
     const bool fast = fabsf(side.omega_rad_s) > limits.overspeed_rad_s;
-    if (runs_away(s.runaway_ticks[i], side, limits)) now |= condition(HIL_REASON_RUNAWAY_LEFT + i);
+    if (runs_away(s.runaway[i], side, limits)) now |= condition(HIL_REASON_RUNAWAY_LEFT + i);
     if (lasts(s.overspeed_ticks[i], fast, limits.overspeed_ticks)) {
       now |= condition(HIL_REASON_OVERSPEED_LEFT + i);
     }
-    if (stalls(s.stall[i], side, limits)) now |= condition(HIL_REASON_STALL_LEFT + i);
+    if (stalls(s.stall[i], s.net_counts[i], side, limits)) now |= condition(HIL_REASON_STALL_LEFT + i);
   }
   check_encoder(s, limits, view.illegal_total);
   check_battery(s, limits, view.battery_mv);

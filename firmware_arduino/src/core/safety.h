@@ -51,12 +51,11 @@ struct SideView {
   float omega_rad_s;
 };
 
-// How long a driven wheel has not got on. It gets on when its count has moved by two since it last did: one
-// live channel of a broken encoder flickers by one and never gets further.
-struct Stall {
-  int16_t net_counts;   // since the wheel last got on
-  uint16_t ticks;       // driven ticks since then
-  uint16_t remembered;  // of earlier pauses; fades at an eighth of the rate, so that a loose contact adds up
+// How long something has held, and what is remembered of earlier times: that fades at an eighth of the rate,
+// so that a loose contact adds up.
+struct Tally {
+  uint16_t ticks;
+  uint16_t remembered;
   uint8_t fade;
 };
 
@@ -70,8 +69,11 @@ struct SafetyView {
 struct Safety {
   uint8_t state;
   uint8_t reason;
-  Stall stall[SIDES];
-  uint16_t runaway_ticks[SIDES];
+  // Since the wheel last got on, that is by two counts: one live channel of a broken encoder flickers by one
+  // and never gets further.
+  int16_t net_counts[SIDES];
+  Tally stall[SIDES];
+  Tally runaway[SIDES];
   uint16_t overspeed_ticks[SIDES];
   uint16_t battery_ticks;
   bool battery_low;
