@@ -116,6 +116,12 @@ class RobotConfig(Section):
     floor: FloorConfig
     bring_up: BringUpConfig | None = Field(None, description="measured, for people to compare with")
 
+    @property
+    def no_load_rad_s(self) -> float:
+        """Return the wheel speed at which the motors' voltage is the full battery's."""
+        motor = self.motor
+        return self.battery.full_v / (motor.emf_constant_v_s_rad * motor.gear_ratio)
+
     @model_validator(mode="after")
     def _current_slow_enough(self) -> Self:
         """RK4 at 1e-4 s is stable up to rates of 27,850 1/s; refuse a robot that comes near."""

@@ -141,9 +141,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink) -> Parts:
     """Return the parts of a session over `rig`."""
     scenario, control = spec.scenario, spec.scenario.control
     robot = scenario.robot
-    geometry = BelievedGeometry(
-        robot.wheel_radius_m, robot.track_m, robot.d0_m, robot.encoder_counts_per_turn
-    )
+    geometry = BelievedGeometry.of(robot)
     timeline = Timeline(recorder, _unix_us)
     return Parts(
         rig=rig,

@@ -44,6 +44,10 @@ class CameraOnly:
         """Return the time since the last exposure; inf before the first."""
         return math.inf if self._t is None else t_host_s - self._t
 
+    def agreement_age_s(self, t_host_s: float) -> float:
+        """Return the same: without wheels every pose is believed."""
+        return self.pose_age_s(t_host_s)
+
     def on_wheels(self, sample: WheelSample) -> None:
         """Ignore the report: this variant sees with the camera alone."""
 

@@ -28,7 +28,11 @@ class Fused(_fused.Fused):
 
     def __init__(self, config: EstimatorConfig, geometry: BelievedGeometry) -> None:
         believed = _fused.Geometry(
-            geometry.wheel_radius_m, geometry.track_width_m, geometry.d0_m, geometry.rad_per_count
+            geometry.wheel_radius_m,
+            geometry.track_width_m,
+            geometry.d0_m,
+            geometry.rad_per_count,
+            geometry.omega_max_rad_s,
         )
         super().__init__(assumptions(config), believed)
         self._wheels = geometry.wheels

@@ -60,10 +60,12 @@ void bind_odometry(nb::module_& m) {
   nb::class_<Geometry>(m, "Geometry")
       .def("__init__",
            [](Geometry* self, double wheel_radius_m, double track_width_m, double d0_m,
-              double rad_per_count) {
-             new (self) Geometry{wheel_radius_m, track_width_m, d0_m, rad_per_count};
+              double rad_per_count, double omega_max_rad_s) {
+             new (self)
+                 Geometry{wheel_radius_m, track_width_m, d0_m, rad_per_count, omega_max_rad_s};
            },
-           "wheel_radius_m"_a, "track_width_m"_a, "d0_m"_a, "rad_per_count"_a)
+           "wheel_radius_m"_a, "track_width_m"_a, "d0_m"_a, "rad_per_count"_a,
+           "omega_max_rad_s"_a = 40.0)
       .def("body",
            [](const Geometry& g, double left, double right) {
              const estimator::BodyMotion motion = g.body({left, right});
@@ -158,6 +160,12 @@ void bind_fused(nb::module_& m) {
            "sigma_theta_rad"_a)
       .def("state_at", &state_at, "t_host_s"_a)
       .def("pose_age_s", &Fused::pose_age_s, "t_host_s"_a)
+      .def("agreement_age_s", &Fused::agreement_age_s, "t_host_s"_a)
+      .def_prop_ro("refused",
+                   [](const Fused& f) {
+                     const estimator::Innovation& i = f.refused();
+                     return nb::make_tuple(i[0], i[1], i[2]);
+                   })
       .def_prop_ro("covariance", [](const Fused& f) { return f.filter().covariance(); })
       .def_prop_ro("scales",
                    [](const Fused& f) {
