@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, model_validator
@@ -23,3 +24,9 @@ class Section(BaseModel):
                     near = difflib.get_close_matches(str(key), known, n=3, cutoff=0.5)
                     raise ValueError(f"unknown key {key!r}; near: {', '.join(near or known)}")
         return tree
+
+
+def rounded_up(limit: float) -> str:
+    """Return a positive lower limit to three digits, rounded so that the figure shown holds."""
+    digits = 2 - math.floor(math.log10(limit)) if limit > 0.0 else 0
+    return f"{math.ceil(round(limit * 10.0**digits, 6)) / 10.0**digits:g}"

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hil.config.base import Section
+from hil.config.base import Section, rounded_up
 
 
 class MotorConfig(Section):
@@ -129,7 +129,9 @@ class RobotConfig(Section):
         rate = self.motor.resistance_ohm + self.motor.per_side * channel_ohm
         if rate / self.motor.inductance_h > 20_000:
             least_h = rate / 20_000
-            raise ValueError(f"motor.inductance_h must be at least {least_h:.2g} H at these drops")
+            raise ValueError(
+                f"motor.inductance_h must be at least {rounded_up(least_h)} H at these drops"
+            )
         return self
 
     @model_validator(mode="after")

@@ -124,8 +124,11 @@ class Fused:
         theta_rad: float,
         sigma_xy_m: float,
         sigma_theta_rad: float,
-    ) -> None:
-        """Take the pose seen at `t_exposure_s` in the past; older than the last one is dropped."""
+    ) -> bool:
+        """Take the pose seen at `t_exposure_s` in the past; older than the last one is dropped.
+
+        Return whether it was believed.
+        """
 
     def state_at(self, t_host_s: float) -> State | None:
         """Return the state at `t_host_s`, past the last exposure; None before the first pose."""

@@ -154,7 +154,7 @@ void bind_fused(nb::module_& m) {
       .def("take_pose",
            [](Fused& f, double t_exposure_s, double x_m, double y_m, double theta_rad,
               double sigma_xy_m, double sigma_theta_rad) {
-             f.take_pose(t_exposure_s, {x_m, y_m, theta_rad}, sigma_xy_m, sigma_theta_rad);
+             return f.take_pose(t_exposure_s, {x_m, y_m, theta_rad}, sigma_xy_m, sigma_theta_rad);
            },
            "t_exposure_s"_a, "x_m"_a, "y_m"_a, "theta_rad"_a, "sigma_xy_m"_a,
            "sigma_theta_rad"_a)

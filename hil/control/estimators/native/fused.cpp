@@ -131,22 +131,24 @@ void Fused::move_anchor(double t_s, const BodyMotion& by) {
   t_anchor_s_ = std::max(t_s, t_anchor_s_);
 }
 
-void Fused::take_pose(double t_exposure_s, const Pose& pose, double sigma_xy_m,
+bool Fused::take_pose(double t_exposure_s, const Pose& pose, double sigma_xy_m,
                       double sigma_theta_rad) {
-  if (!(t_exposure_s > t_anchor_s_)) return;  // a time that is no number too
+  if (!(t_exposure_s > t_anchor_s_)) return false;  // a time that is no number too
   if (!std::isfinite(pose.x_m + pose.y_m + pose.theta_rad + sigma_xy_m + sigma_theta_rad)) {
     ++gated_total_;
-    return;
+    return false;
   }
   advance(t_exposure_s);
+  bool believed = true;
   if (t_pose_s_) {
-    correct(t_exposure_s, pose, sigma_xy_m, sigma_theta_rad);
+    believed = correct(t_exposure_s, pose, sigma_xy_m, sigma_theta_rad);
   } else {
     place(t_exposure_s, pose, sigma_xy_m, sigma_theta_rad);
     t_agreed_s_ = t_exposure_s;  // nothing to disagree with yet
   }
   head_ = anchor();
   for (const Increment& i : path_) head_ = moved(head_, {i.forward_m, i.turn_rad});
+  return believed;
 }
 
 // Sets the anchor on a pose.
@@ -156,7 +158,7 @@ void Fused::place(double t_s, const Pose& pose, double sigma_xy_m, double sigma_
 }
 
 // Corrects the anchor by a pose; a run of gated poses that agree moves it there instead.
-void Fused::correct(double t_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad) {
+bool Fused::correct(double t_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad) {
   const BodyMotion speed = geometry_.body(speeds_.omega_rad_s());
   const Innovation innovation = filter_.innovation(pose);
   // An exposure dated wrongly by sigma_time looks like an error along the motion.
@@ -166,15 +168,15 @@ void Fused::correct(double t_s, const Pose& pose, double sigma_xy_m, double sigm
   if (filter_.correct(innovation, var_xy, var_theta, assumptions_.gate_chi2)) {
     t_pose_s_ = t_agreed_s_ = t_s;
     gated_.run = 0;
-    return;
+    return true;
   }
   ++gated_total_;
   refused_ = innovation;
   note_gated(t_s, innovation);
-  if (gated_.run >= assumptions_.reacquire_poses) {
-    place(t_s, pose, sigma_xy_m, sigma_theta_rad);
-    gated_.innovation = {0.0, 0.0, 0.0};  // the run goes on from the pose believed
-  }
+  if (gated_.run < assumptions_.reacquire_poses) return false;
+  place(t_s, pose, sigma_xy_m, sigma_theta_rad);
+  gated_.innovation = {0.0, 0.0, 0.0};  // the run goes on from the pose believed
+  return true;
 }
 
 // Counts a gated pose into the run of gated ones that it carries on, or starts a new run with it.

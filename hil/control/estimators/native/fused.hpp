@@ -41,8 +41,9 @@ class Fused {
   // Takes one wheel report (in time order; a stale one is dropped).
   void take_wheels(double t_host_s, std::int32_t counts_left, std::int32_t counts_right);
 
-  // Takes the pose seen at t_exposure_s in the past; older than the last one is dropped.
-  void take_pose(double t_exposure_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad);
+  // Takes the pose seen at t_exposure_s in the past; older than the last one is dropped. Says whether it was
+  // believed: it passed the gate, or ended a run of gated ones that agree.
+  bool take_pose(double t_exposure_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad);
 
   // The state at t_host_s, past the last exposure; nothing before the first pose. Speeds are predicted; for
   // a time already passed they are those of the latest report.
@@ -90,7 +91,7 @@ class Fused {
   void advance(double t_s);
   void move_anchor(double t_s, const BodyMotion& by);
   void place(double t_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad);
-  void correct(double t_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad);
+  bool correct(double t_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad);
   void note_gated(double t_s, const Innovation& innovation);
 
   Assumptions assumptions_;
