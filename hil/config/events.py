@@ -99,7 +99,7 @@ class Disturbance(Section):
         if self.shape == "pulse" and self.end_s is None:
             raise ValueError("a pulse needs end_s")
         least, why = LEAST_STEP.get(self.target, (-math.inf, ""))
-        if self.shape in {"step", "pulse"} and self.amplitude < least:
+        if self.shape == "step" and self.amplitude < least:
             raise ValueError(
                 f"amplitude {self.amplitude:g} of {self.target} must be at least {least:g}: {why}"
             )

@@ -195,12 +195,25 @@ def _regress(points: list[tuple[float, float, float]], unseen_s: float) -> _Fit:
     )
 
 
+# A stamp later than the tie by more is not the camera's jitter: so many sigma of the scatter, and this
+# much where there is hardly any, or (the second) before the scatter is known.
+_ODD_SIGMAS = 5.0
+_ODD_S, _ODD_AT_FIRST_S = 0.02, 0.2
+_SCATTER_FRAMES = 16
+# So many odd frames in a row that agree with each other mean that the camera's clock has stepped.
+_STEP_FRAMES = 4
+
+
 class CameraClock:
     """Ties the camera's stamps to host time from when the frames arrive.
 
     arrival = exposure + latency + jitter, so host time of a stamp is the stamp plus the median of
     (arrival - stamp) over the last frames, less the calibrated median latency. The median is
     blind to frames held up by a busy host or radio; its window bounds the lag behind a drift.
+
+    A stamp that no delay explains is refused: later than the tie allows (the frame would have been
+    exposed after it arrived), or gone back behind an earlier one. A few of them in a row that agree
+    are another clock: the old window is dropped, as `BoardClock` does when the board was reset.
     """
 
     def __init__(self, latency_s: float, window: int = 301) -> None:
@@ -208,6 +221,11 @@ class CameraClock:
         self._window = window
         self._gaps_s: deque[float] = deque()
         self._sorted_s: list[float] = []
+        self._newest_cam_s = -math.inf
+        self._odd_s: list[float] = []
+        self.refused = 0
+        self.restarts = 0
+        self.step_s = 0.0  # of the stamps, at the last restart
 
     @property
     def ready(self) -> bool:
@@ -218,23 +236,79 @@ class CameraClock:
     def sigma_s(self) -> float:
         """Standard error in s of the tie, from the scatter of arrivals; inf below two frames."""
         count = len(self._sorted_s)
-        if count < 2:
-            return math.inf
-        # Half the inter-quartile range over 0.674 is sigma of a normal scatter; the median of n
-        # has 1.253 times the standard error of a mean.
-        quartiles_s = self._sorted_s[(3 * count) // 4] - self._sorted_s[count // 4]
-        return 1.253 * quartiles_s / (2.0 * 0.674) / math.sqrt(count)
+        # The median of n has 1.253 times the standard error of a mean.
+        return 1.253 * self._scatter_s() / math.sqrt(count) if count > 1 else math.inf
 
-    def arrival(self, t_cam_s: float, t_host_s: float) -> None:
-        """Take a frame stamped `t_cam_s` (mid exposure) that reached the host at `t_host_s`."""
+    def arrival(self, t_cam_s: float, t_host_s: float) -> bool:
+        """Take a frame stamped `t_cam_s` (mid exposure) that reached the host at `t_host_s`.
+
+        Returns False when the stamp was refused: nothing may be dated by it.
+        """
         gap_s = t_host_s - t_cam_s
+        if not math.isfinite(gap_s):
+            self.refused += 1
+            return False
+        if self._is_odd(t_cam_s, gap_s):
+            self._odd_s.append(gap_s)
+            if not self._has_stepped():
+                self.refused += 1
+                return False
+            self._restart()
+        else:
+            self._odd_s.clear()
+            self._take(gap_s)
+        self._newest_cam_s = t_cam_s
+        return True
+
+    def to_host_s(self, t_cam_s: float) -> float:
+        """Return the host time of the exposure stamped `t_cam_s`; needs one arrival first."""
+        return t_cam_s + self._median_s() - self._latency_s
+
+    def _median_s(self) -> float:
+        count = len(self._sorted_s)
+        if count == 0:
+            return math.nan
+        return 0.5 * (self._sorted_s[(count - 1) // 2] + self._sorted_s[count // 2])
+
+    def _scatter_s(self) -> float:
+        """Half the inter-quartile range over 0.674: sigma of a normal scatter."""
+        count = len(self._sorted_s)
+        quartiles_s = self._sorted_s[(3 * count) // 4] - self._sorted_s[count // 4]
+        return quartiles_s / (2.0 * 0.674)
+
+    def _margin_s(self) -> float:
+        if len(self._sorted_s) < _SCATTER_FRAMES:
+            return _ODD_AT_FIRST_S
+        return max(_ODD_S, _ODD_SIGMAS * self._scatter_s())
+
+    def _is_odd(self, t_cam_s: float, gap_s: float) -> bool:
+        """Tell whether no delay explains the stamp; once one is odd, also those that go with it."""
+        if not self.ready:
+            return False
+        off_s = gap_s - self._median_s()
+        margin_s = self._margin_s()
+        if off_s < -margin_s or t_cam_s < self._newest_cam_s:
+            return True
+        return bool(self._odd_s) and off_s > margin_s
+
+    def _has_stepped(self) -> bool:
+        """Tell whether the last odd frames agree, as far as the jitter lets them."""
+        last_s = self._odd_s[-_STEP_FRAMES:]
+        return len(last_s) == _STEP_FRAMES and max(last_s) - min(last_s) <= self._margin_s()
+
+    def _restart(self) -> None:
+        """Begin anew with the frames that agree."""
+        before_s, last_s = self._median_s(), self._odd_s[-_STEP_FRAMES:]
+        self._gaps_s.clear()
+        self._sorted_s.clear()
+        self._odd_s.clear()
+        for gap_s in last_s:
+            self._take(gap_s)
+        self.step_s = before_s - self._median_s()
+        self.restarts += 1
+
+    def _take(self, gap_s: float) -> None:
         self._gaps_s.append(gap_s)
         insort(self._sorted_s, gap_s)
         if len(self._gaps_s) > self._window:
             del self._sorted_s[bisect_left(self._sorted_s, self._gaps_s.popleft())]
-
-    def to_host_s(self, t_cam_s: float) -> float:
-        """Return the host time of the exposure stamped `t_cam_s`; needs one arrival first."""
-        count = len(self._sorted_s)
-        median_s = 0.5 * (self._sorted_s[(count - 1) // 2] + self._sorted_s[count // 2])
-        return t_cam_s + median_s - self._latency_s
