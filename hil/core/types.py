@@ -121,6 +121,10 @@ class Estimator(Protocol):
     def refused(self) -> tuple[float, float, float]:
         """The last pose not believed minus the pose expected then: m, m, rad; zero before one."""
 
+    @property
+    def scales(self) -> tuple[float, float]:
+        """What the camera sees of a metre and of a radian that the wheels turn."""
+
     def on_command(self, t_effect_s: float, eta1_m_s: float, theta_dot_rad_s: float) -> None:
         """Take the body speeds commanded to be in effect from `t_effect_s` on."""
 

@@ -53,6 +53,11 @@ class CameraOnly:
         """The last pose refused minus the pose expected then: none ever is."""
         return 0.0, 0.0, 0.0
 
+    @property
+    def scales(self) -> tuple[float, float]:
+        """What the camera sees of what the wheels turn: not asked here."""
+        return 1.0, 1.0
+
     def on_wheels(self, sample: WheelSample) -> None:
         """Ignore the report: this variant sees with the camera alone."""
 
