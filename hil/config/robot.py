@@ -12,6 +12,9 @@ from pydantic import Field, model_validator
 
 from hil.config.base import Section, rounded_up
 
+# Wheels and reflected rotors of one side; the lightest toy has ten times as much.
+_LEAST_SIDE_KG_M2 = 1e-5
+
 
 class MotorConfig(Section):
     """One geared motor (2.11); torques are at the gearbox output, electrical constants at the rotor."""
@@ -131,6 +134,19 @@ class RobotConfig(Section):
             least_h = rate / 20_000
             raise ValueError(
                 f"motor.inductance_h must be at least {rounded_up(least_h)} H at these drops"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _sides_have_inertia(self) -> Self:
+        """Wheels that turn by themselves are divided by it; less than this RK4 cannot follow."""
+        motor = self.motor
+        rotors = motor.per_side * motor.gear_ratio**2 * motor.rotor_inertia_kg_m2
+        side = rotors + 2.0 * self.wheel_inertia_kg_m2
+        if self.variant != "constrained" and side < _LEAST_SIDE_KG_M2:
+            raise ValueError(
+                f"wheel_inertia_kg_m2 and motor.rotor_inertia_kg_m2 give a side {side:.2g} kg m^2, "
+                f"variant {self.variant} needs at least {_LEAST_SIDE_KG_M2:g} kg m^2"
             )
         return self
 

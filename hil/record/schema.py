@@ -111,6 +111,9 @@ FRAME_COLUMNS = (
     Column("rear_v_px", "px", "marks", "rear mark, image row"),
 )
 
+# Columns that records made before them do not have: not known there.
+ADDED_LATER = ("pose_accepted",)
+
 SAMPLE_NAMES = tuple(column.name for column in SAMPLE_COLUMNS)
 FRAME_NAMES = tuple(column.name for column in FRAME_COLUMNS)
 _TRACE_KEYS = tuple(column.trace_key for column in LAW_COLUMNS)
