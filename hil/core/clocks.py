@@ -134,7 +134,7 @@ class BoardClock:
     def _is_clear(self, unwrapped_us: int) -> bool:
         """Tell whether the board's port was free of the last report when it answered."""
         since_us = unwrapped_us - self._report_us
-        return self._period_us < 0 or not 0 <= 2 * since_us < self._period_us
+        return self._period_us > 0 and not 0 <= 2 * since_us < self._period_us
 
     def to_host_s(self, t_mcu_us: int) -> float:
         """Return the host time of a board stamp no further than 35 minutes from the newest one."""
