@@ -18,13 +18,15 @@ _HALF_WRAP_US = 1 << 31
 # Prior on how the excess of a round trip splits between the two ways: both are alike, give or take;
 # anything, where answers may have waited on the board's port.
 _ASYMMETRY_CLEAR, _ASYMMETRY_ANY = 0.08, 0.577
+# Share of the excess by which frames held up by those before them may still put the middle off.
+_HELD_RATIO = 0.05
 # An answer stamped in the first half of a report's period may have waited behind that report on the
 # board's port; once there are so many that did not, the tie is made of these.
-_CLEAR_WANTED = 4
+_CLEAR_WANTED = 8
 # The soonest report of each half second follows the board's rate; so many of them are kept.
 _SOONEST_S = 0.5
 _SOONEST_KEPT = 64
-_SOONEST_WANTED = 6
+_SOONEST_WANTED = 12
 # Prior on the rate of the board's clock: a ceramic resonator is good to 0.5 % (5,000 ppm).
 _DRIFT_PRIOR_RATIO = 5e-3
 # Resolution below which nothing is claimed: the board may stamp in 4 us, the host in polls.
@@ -257,7 +259,7 @@ def _regress(
         lag_s=mean_y - (drift0 + drift) * mean_t - asymmetry * mean_e,
         drift=drift0 + drift,
         mean_t_s=mean_t,
-        var_s2=noise / n + noise * tt / det * mean_e**2 + unseen_s**2 / 3.0,
+        var_s2=noise / n + (noise * tt / det + _HELD_RATIO**2) * mean_e**2 + unseen_s**2 / 3.0,
         var_drift=noise * ee / det,
     )
 
