@@ -11,8 +11,9 @@ from random import Random
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
-from hil.cli.main import main
+from hil.cli.main import cli
 from hil.config.load import load_scenario
 from hil.core.rig import Frame
 from hil.core.types import Pose
@@ -191,16 +192,15 @@ def test_exchanged_marks_are_a_fault_of_their_own(law: str, speed_m_s: float) ->
     assert outside_m(record) < 0.0
 
 
-def test_the_command_says_so_and_ends_with_3(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_says_so_and_ends_with_3(tmp_path: Path) -> None:
     """`hil run` names the fault with its figures."""
     out = str(tmp_path / "run")
     words = ["run", "scenario-2", "--camera", "pose", "--set", "camera.marks.swapped_marks=true"]
-    assert main([*words, "--json", "--out", out]) == 3
-    told = json.loads(capsys.readouterr().out)
-    assert "camera and wheels disagree" in json.dumps(told)
-    assert "limit 0.7 s" in json.dumps(told)
+    ended = CliRunner().invoke(cli, [*words, "--json", "--out", out], standalone_mode=False)
+    assert ended.return_value == 3
+    told = json.dumps(json.loads(ended.stdout))
+    assert "camera and wheels disagree" in told
+    assert "limit 0.7 s" in told
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
