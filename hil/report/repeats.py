@@ -168,7 +168,8 @@ def _contrast(
     volts = difference(battery)
     results, at_equal = {}, {}
     for figure, values in by_figure.items():
-        results[figure] = paired(*(arm_values(values, weights) for weights in sides))
+        one, two = (arm_values(values, weights) for weights in sides)
+        results[figure] = paired(one, two)
         item = adjusted(difference(values), volts)
         if item is not None:
             at_equal[figure] = item

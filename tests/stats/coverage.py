@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hil.analysis.intervals import crossed_interval, mean_interval, mean_intervals
+from hil.analysis.intervals import crossed_interval, mean_intervals
 
 Draw = Callable[[np.random.Generator, tuple[int, ...]], np.ndarray]
 
@@ -40,7 +40,7 @@ VERY_SKEWED: dict[str, Draw] = {
     "lognormal, sigma 0.75": lognormal(0.75),
     "lognormal, sigma 1": lognormal(1.0),
 }
-SIZES = (6, 8, 10, 14, 20, 30, 50, 100, 400, 600)
+SIZES = (3, 4, 5, 6, 8, 10, 14, 20, 30, 50, 100, 400, 600)
 
 
 def coverage(draw: Draw, size: int, studies: int, seed: int = 1) -> float:
@@ -83,8 +83,6 @@ def main() -> None:
                 continue
             print(seeds, draws, sds, f"{100 * crossed_coverage(seeds, draws, sds, 2000):.1f}")
 
-
-__all__ = ["USUAL", "VERY_SKEWED", "coverage", "crossed_coverage", "mean_interval"]
 
 if __name__ == "__main__":
     main()
