@@ -32,7 +32,8 @@ RESAMPLES = 5_000
 LEAST_FOR_BOOTSTRAP, MOST_FOR_BOOTSTRAP = 6, 500
 _SEED = 8_10_4
 # No end is nearer than this share of Student's reach: by the number of values, measured.
-_LEAST_REACH = ((10, 0.90), (20, 0.95), (math.inf, 1.0))
+_LEAST_REACH = ((10, 0.85), (20, 0.95), (math.inf, 1.0))
+_WIDER = ((10, 1.05), (math.inf, 1.0))  # the bootstrap of so few values falls a little short
 _MOST_REACH = 3.0
 _ROUNDING = 1e-12
 
@@ -74,6 +75,8 @@ class Coverage:
         )
 
 
+# Up to here it is worth saying how far an interval is to be trusted.
+FEW = 30
 # By the least number of independent values.
 _MEASURED = (
     (2, Coverage(0.0, 0.0, 0.0)),
@@ -101,9 +104,9 @@ def mean_intervals(samples: Array) -> Array:
     ends = np.stack([mean - reach, mean + reach], axis=1)
     if LEAST_FOR_BOOTSTRAP <= size < MOST_FOR_BOOTSTRAP:
         spread = reach > 0.0
-        share = next(share for below, share in _LEAST_REACH if size < below)
+        share, wider = (next(x for n, x in table if size < n) for table in (_LEAST_REACH, _WIDER))
         least, most = share * reach[spread], _MOST_REACH * reach[spread]
-        below, above = np.clip(_bootstrap_reach(samples[spread]), least, most)
+        below, above = np.clip(wider * _bootstrap_reach(samples[spread]), least, most)
         ends[spread] = np.stack([mean[spread] - below, mean[spread] + above], axis=1)
     return ends
 

@@ -112,9 +112,8 @@ class Waypoints:
         d1, d2 = spline(u, 1), spline(u, 2)
         speed = np.hypot(d1[:, 0], d1[:, 1])
         turn = np.abs(d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]) / np.maximum(speed, 1e-9) ** 2
-        return np.maximum(
-            speed * rate / config.speed_max_m_s, turn * rate / config.turn_rate_max_rad_s
-        )
+        by_speed, by_turn = rate / config.speed_max_m_s, rate / config.turn_rate_max_rad_s
+        return np.asarray(np.maximum(speed * by_speed, turn * by_turn), np.float64)
 
     def share_of_way(self, t_s: float) -> float:
         """Return how much of the way (chord length) is done at `t_s`, 0 to 1."""

@@ -18,7 +18,7 @@ import numpy as np
 from hil.analysis.intervals import Interval
 from hil.analysis.metrics import BY_NAME
 from hil.analysis.stats import Paired, Tape, level, paired
-from hil.report.repeats import Arm, arm_names, law_rank
+from hil.report.arms import Arm, arm_names, law_rank
 from hil.study.campaign.plan import HOLDS, Campaign, metric_of
 
 if TYPE_CHECKING:
