@@ -115,6 +115,7 @@ def paired(
     if not found.crossed:
         median, median_holds = median_interval(found.own)
     spread = float(difference.std(ddof=1)) if difference.size > 1 else math.nan
+    spread = 0.0 if spread > 0.0 and np.ptp(difference) == 0.0 else spread
     return Paired(
         pairs=int(difference.size),
         left_out=left_out,

@@ -1,7 +1,8 @@
 """Repeated runs of one scenario: arms (outer law over inner law), paired by seed.
 
-Runs of one pair of laws with other gains are another arm (hil/report/arms.py). Seeds that every arm has form the pairs. With both outer and both inner laws the four arms give
-three contrasts per figure: outer law, inner law, and their interaction.
+Runs of one pair of laws with other gains are another arm (hil/report/arms.py). Seeds that every arm
+has form the pairs. With both outer and both inner laws the four arms give three contrasts per
+figure: outer law, inner law, and their interaction.
 """
 
 from __future__ import annotations
@@ -183,17 +184,17 @@ def _warnings(
     arms: dict[Arm, dict[int, RunRecord]], names: dict[Arm, str], common: Sequence[int]
 ) -> list[str]:
     lines = []
-    for arm, by_seed in arms.items():
-        alone = sorted(set(by_seed) - set(common))
+    for arm, own in arms.items():
+        alone = sorted(set(own) - set(common))
         if alone:
             lines.append(f"{names[arm]}: {len(alone)} runs without a partner of the same seed")
-        ended = sum(run.manifest.outcome != "complete" for run in by_seed.values())
+        ended = sum(run.manifest.outcome != "complete" for run in own.values())
         if ended:
             lines.append(f"{names[arm]}: {ended} runs ended early; their pairs are left out")
-        replays = sum(is_open_loop(run) for run in by_seed.values())
+        replays = sum(is_open_loop(run) for run in own.values())
         if replays:
             lines.append(f"{names[arm]}: {replays} replays (open loop); their pairs are left out")
-    lines += _unlike([run for by_seed in arms.values() for run in by_seed.values()])
+    lines += _unlike([run for own in arms.values() for run in own.values()])
     if len(common) < FEW:
         lines.append(f"{len(common)} pairs: {coverage_of(len(common)).text()}")
     return lines
