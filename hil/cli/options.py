@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+
+if TYPE_CHECKING:
+    from hil.config.scenario import Scenario
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -46,3 +49,13 @@ json_option = click.option("--json", "as_json", is_flag=True,
 def print_json(document: dict[str, Any]) -> None:
     """Write one JSON document to stdout."""
     click.echo(json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False))
+
+
+def warn_unfinished(scenarios: Iterable[Scenario]) -> None:
+    """Say on stderr where a run would end before its reference does."""
+    from hil.control.references import unfinished
+
+    for scenario in scenarios:
+        told = unfinished(scenario.reference, scenario.duration_s)
+        if told is not None:
+            click.echo(f"note: {scenario.name}: {told}", err=True)

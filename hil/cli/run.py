@@ -20,6 +20,7 @@ from hil.cli.options import (
     seed_option,
     set_option,
     target_option,
+    warn_unfinished,
 )
 from hil.cli.progress import run_progress
 
@@ -67,6 +68,7 @@ def command(
     from hil.runs.execute import RunSpec, camera_for, execute, exit_status, new_folder
 
     resolved = load_scenario(scenario, overrides)
+    warn_unfinished([resolved])
     spec = RunSpec(
         scenario=resolved,
         target=target,

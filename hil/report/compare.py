@@ -9,10 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hil.analysis.metrics import BY_NAME, METRICS, Figures, Metric, Verdict, check
+from hil.config.control import WaypointReference
+from hil.control.references import unfinished
 from hil.core.errors import BadInput
+from hil.record import layout
+from hil.record.manifest import read_manifest
 from hil.report.target_gap import tier_gap
 
 if TYPE_CHECKING:
@@ -89,8 +94,9 @@ def compare_runs(runs: Sequence[RunRecord]) -> Comparison:
     """Return the comparison of two or more runs; raises BadInput when their tasks differ."""
     if len(runs) < 2:
         raise BadInput(f"compare: {len(runs)} run given, at least 2 are needed")
-    for run in runs[1:]:
+    for run in runs:
         refuse_other_task(runs[0], run)
+        _refuse_other_tape(run)
     entries = tuple(_entry(label, run) for label, run in zip(labels(runs), runs, strict=True))
     first = runs[0].manifest
     description = str(first.scenario.get("description", ""))
@@ -110,6 +116,21 @@ def refuse_other_task(first: RunRecord, other: RunRecord) -> None:
             raise BadInput(
                 f"{other.path}: cannot be compared with {first.path}: scenario {key} differs "
                 f"({_short(there)} against {_short(here)}); compare runs of one scenario"
+            )
+
+
+def _refuse_other_tape(run: RunRecord) -> None:
+    """Raise BadInput when a replay was made of a record of another task than its own."""
+    folder = Path(run.manifest.target.removeprefix("replay:"))
+    if not is_open_loop(run) or not (folder / layout.MANIFEST).is_file():
+        return
+    recorded = read_manifest(folder).scenario
+    for key in ("name", "start", "reference"):
+        if recorded.get(key) != run.manifest.scenario.get(key):
+            raise BadInput(
+                f"{run.path}: is a replay of {folder}, whose scenario {key} is another "
+                f"({_short(recorded.get(key))} against {_short(run.manifest.scenario.get(key))}); its "
+                "figures are of no task: leave it out"
             )
 
 
@@ -153,6 +174,8 @@ def _warnings(entries: Sequence[Entry]) -> list[str]:
 def _flaws(entry: Entry) -> list[str]:
     manifest = entry.run.manifest
     flaws = list(entry.run.problems)
+    if told := _unfinished(manifest.scenario):
+        flaws.append(told)
     if manifest.outcome in {"fault", "interrupted"}:
         detail = f" ({manifest.outcome_detail})" if manifest.outcome_detail else ""
         flaws.append(
@@ -165,6 +188,17 @@ def _flaws(entry: Entry) -> list[str]:
             "figures are not set against those of other runs"
         )
     return flaws
+
+
+def _unfinished(scenario: Mapping[str, Any]) -> str | None:
+    """Return that a run of this scenario ends before its waypoints do; None when it does not."""
+    if (scenario.get("reference") or {}).get("kind") != "waypoints":
+        return None
+    try:
+        config = WaypointReference.model_validate(scenario["reference"])
+        return unfinished(config, float(scenario["duration_s"]))
+    except (ValueError, TypeError, KeyError, BadInput):  # not one of ours: nothing is known of it
+        return None
 
 
 def differences(
