@@ -191,7 +191,7 @@ def test_a_replay_of_another_task_is_refused(pair, tmp_path):
     assert len(compare_runs([pair[0], own]).entries) == 2
     second = make_run(tmp_path / "second", "pid", tree=scenario("scenario-2"))
     asked = altered(second, target=f"replay:{tape.path}")
-    with pytest.raises(BadInput, match="is a replay of .* whose scenario name is another"):
+    with pytest.raises(BadInput, match=r"is a replay of .* whose scenario name is another"):
         compare_runs([second, asked])
 
 
