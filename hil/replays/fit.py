@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from random import Random
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -50,6 +50,7 @@ _BOUNDS = (0.6, 1.6)
 _KNOWN = 0.1
 # Quantised counts make the residual rough on a small scale: differences are taken over 2 %.
 _STEP = 0.02
+_SPAN, _SPAN_TIE_S = 0.06, 0.01  # and over twice these for the intervals
 # Size of a usual disagreement of each kind, which makes the residual a pure number.
 _SCALES = {"wheel speed": 0.3, "pwm": 15.0, "forward": 0.004, "turn": 0.02}
 _COLUMNS = {"wheel speed": 2, "pwm": 2, "forward": 1, "turn": 1}
@@ -262,7 +263,9 @@ def fit_twin(rehearsal: Rehearsal) -> Fit:
         x_scale=[0.1] * len(names) + [0.01], loss="soft_l1", max_nfev=15,
     )  # fmt: skip
     seen, unseen = _rms(difference(found.x, fitted)), _rms(difference(found.x, held_out))
-    reach = _reach(found.jac, found.fun, {n: max(seen[n], unseen[n]) for n in _SCALES})
+    reach = _reach(
+        _sensitivity(residual, found.x), found.fun, {n: max(seen[n], unseen[n]) for n in _SCALES}
+    )
     return Fit(
         ratios={
             name: (float(found.x[i]), float(found.x[i] - reach[i]), float(found.x[i] + reach[i]))
@@ -284,6 +287,13 @@ def median_angle_rad(angles_rad: Array) -> float:
     return wrap_pi(middle + float(np.median(away)))
 
 
+def _sensitivity(residual: Callable[[Array], Array], at: Array) -> Array:
+    """Return the residual's derivatives, central over _SPAN; the search's own are rough."""
+    spans = np.array([_SPAN] * (at.size - 1) + [_SPAN_TIE_S])
+    sides = [(at + step, at - step) for step in np.diag(spans)]
+    return np.stack([residual(up) - residual(down) for up, down in sides], axis=1) / (2.0 * spans)
+
+
 def _reach(jacobian: Array, residual: Array, rms: Mapping[str, float]) -> Array:
     """Return half the 95 % interval of each parameter.
 
@@ -292,7 +302,8 @@ def _reach(jacobian: Array, residual: Array, rms: Mapping[str, float]) -> Array:
     `rms` (in its unit, on the windows fitted or held out, the larger) whose signs are those that
     move the parameter furthest. Windows are few and alike within: Student's t over their number.
     """
-    # least_squares returns the Jacobian weighted by soft L1 and the residual unweighted.
+    # Soft L1's weights, as least_squares applies them.
+    jacobian = jacobian * (1.0 + residual[:, None] ** 2) ** -0.75
     weighted = residual * (1.0 + residual**2) ** 0.25
     degrees = max(residual.size - jacobian.shape[1], 1)
     inverse = np.linalg.pinv(jacobian)
