@@ -16,6 +16,7 @@ from hil.cli.options import (
     seed_option,
     set_option,
     target_option,
+    warn_unfinished,
 )
 from hil.cli.progress import run_progress
 from hil.core.text import visible
@@ -70,6 +71,7 @@ def command(
     conditions = Conditions(target, camera, inner, seed, repeats, overrides, command_line())
     folder = out or new_folder("experiment")
     specs = deck_specs(load_deck(deck), conditions, folder)
+    warn_unfinished({spec.scenario.name: spec.scenario for spec in specs}.values())
     todo = claim(folder, specs)
     if len(todo) < len(specs):
         click.echo(f"{len(specs) - len(todo)} of {len(specs)} runs are there already", err=True)

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from hil.cli.options import json_option, print_json
+from hil.cli.options import json_option, print_json, warn_unfinished
 from hil.core.text import visible
 
 
@@ -40,6 +40,7 @@ def command(
     from hil.study.campaign.work import run_campaign
 
     campaign = load_campaign(file)
+    warn_unfinished([campaign.scenario(())])
     folder = out or new_folder(f"sweep-{campaign.file.name}")
     with job_progress(campaign.file.name) as update:
         table, totals = run_campaign(campaign, folder, workers, dask, update)

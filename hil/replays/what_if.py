@@ -66,6 +66,7 @@ class WhatIf:
             "fitted twin, true over believed with 95 % intervals:",
             *(
                 f"  {group}: {value:.3f} ({low:.3f} to {high:.3f})"
+                f"{'' if fit.identifiable(group) else ', not identifiable from this record'}"
                 for group, (value, low, high) in fit.ratios.items()
             ),
             f"residual, RMS over {fit.windows_held_out} windows held out "

@@ -25,8 +25,8 @@ def repeats_context(repeats: Repeats) -> dict[str, Any]:
     return {
         "intro": (
             f"{len(repeats.seeds)} seeds, each run with every law under the same noise, delays and "
-            f"losses. Runs that met every requirement: {met}. Intervals are BCa bootstrap "
-            "intervals of the mean difference (Student's t below 6 pairs)."
+            f"losses. Runs that met every requirement: {met}. Intervals are 95 % "
+            "intervals of the mean difference: Student's t and the studentised bootstrap."
         ),
         "caption": (
             "Mean of other - baseline in percent of the baseline's mean, with its 95 % interval; "

@@ -69,6 +69,15 @@ def judge(trials: Sequence[Trial], figures: Sequence[Figures]) -> Verdict:
         scenario: {name: {outer: [] for outer in SEARCH} for name in JUDGED}
         for scenario in (ALL_SCENARIOS, *HELD_OUT_SCENARIOS)
     }
+    # The scenarios share their seeds: over all of them it is the seeds that were drawn.
+    tapes = {
+        scenario: [
+            (trial.seed, 0)
+            for trial in trials
+            if trial.outer == "pid" and scenario in {ALL_SCENARIOS, trial.case.scenario}
+        ]
+        for scenario in values
+    }
     for trial, found in zip(trials, figures, strict=True):
         known = {**found, "cost": run_cost(found)}
         for scenario in (ALL_SCENARIOS, trial.case.scenario):
@@ -78,7 +87,8 @@ def judge(trials: Sequence[Trial], figures: Sequence[Figures]) -> Verdict:
         seeds=tuple(dict.fromkeys(trial.seed for trial in trials)),
         differences={
             scenario: {
-                name: paired(by_law["pid"], by_law["asg-ism"]) for name, by_law in table.items()
+                name: paired(by_law["pid"], by_law["asg-ism"], tapes[scenario])
+                for name, by_law in table.items()
             }
             for scenario, table in values.items()
         },

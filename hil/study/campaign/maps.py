@@ -80,11 +80,16 @@ def _figures(outcomes: Outcomes) -> list[str]:
                     map_figure(outcomes, axes[0], axes[1], figure),
                     f"{metric_of(figure).label}: difference to {outcomes.labels[0]} in percent"
                     f"{' of all runs' if figure == HOLDS.name else ' of it'}. Blue: lower, red: "
-                    f"higher; {metric_of(figure).better} is better. A dot marks a 95 % interval "
+                    f"higher{_direction(figure)}. A dot marks a 95 % interval "
                     "without zero.",
                 )
             )
     return found
+
+
+def _direction(figure: str) -> str:
+    better = metric_of(figure).better
+    return "" if better == "neither" else f"; {better} is better"
 
 
 def _captioned(svg: str, caption: str) -> str:
