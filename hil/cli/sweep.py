@@ -26,6 +26,10 @@ def command(
 
     Every combination of the values in [grid] and [[together]], `draws` draws of [random], `seeds`
     seeds and all laws; runs are kept in memory, one row each goes to results.parquet.
+
+    However a campaign was stopped, the same command with the same --out goes on; a row that was lost
+    with a damaged file is made again. Exit status 3 when not one run came to its end (2 when all were
+    refused).
     """
     from hil.cli.progress import job_progress
     from hil.record.manifest import command_line
@@ -33,15 +37,18 @@ def command(
     from hil.study.campaign.findings import documents, outcomes_of, sentences
     from hil.study.campaign.maps import write_page
     from hil.study.campaign.plan import load_campaign
+    from hil.study.campaign.results import PAGE, early_ends, programs
     from hil.study.campaign.work import run_campaign
 
     campaign = load_campaign(file)
     folder = out or new_folder(f"sweep-{campaign.file.name}")
     with job_progress(campaign.file.name) as update:
-        table, totals = run_campaign(campaign, folder, workers, dask, update)
+        table, totals = run_campaign(campaign, folder, workers, dask, update, _say)
+    ends, made_by = early_ends(table), programs(table)
+    notes = [*ending_lines(ends, totals.runs), *program_lines(made_by)]
     outcomes = outcomes_of(campaign, table)
-    page = folder / "report.html"
-    write_page(page, outcomes, command_line())
+    page = folder / PAGE
+    write_page(page, outcomes, command_line(), [*notes, *(f"Made by {name}." for name in made_by)])
     efficiency = totals.efficiency
     document: dict[str, Any] = {
         "campaign": campaign.file.name,
@@ -53,14 +60,41 @@ def command(
         "wall_s": round(totals.wall_s, 3),
         "workers": totals.workers,
         "parallel_efficiency": round(efficiency, 4) if efficiency is not None else None,
+        "ended_early": ends,
+        "programs": made_by,
         "answers": list(documents(outcomes)),
     }
+    status = 0 if outcomes.complete.any() else 2 if set(ends) == {"refused"} else 3
     if as_json:
         print_json(document)
-        return 0
+        return status
     told = f", {efficiency:.0%} of the workers' time spent on runs" if efficiency else ""
     click.echo(f"{totals.runs} runs, {totals.runs_now} of them now in {totals.wall_s:.1f} s{told}")
+    for line in notes:
+        click.echo(f"note: {line}")
     for line in sentences(outcomes):
         click.echo(f"- {line}")
     click.echo(f"results: {document['results']}\nreport: {page}")
-    return 0
+    return status
+
+
+def _say(text: str) -> None:
+    click.echo(f"note: {text}", err=True)
+
+
+def ending_lines(ends: dict[str, dict[str, Any]], runs: int) -> list[str]:
+    """Return a line on each way in which runs ended without figures, with its commonest cause."""
+    how = {"fault": "ended in a fault", "refused": "were refused", "error": "failed in the program"}
+    return [
+        f"{end['runs']} of {runs} runs {how.get(outcome, f'ended {outcome}')} "
+        f"({'' if end['runs'] == 1 else 'most often: '}{end['commonest_cause']})"
+        for outcome, end in ends.items()
+    ]
+
+
+def program_lines(made_by: dict[str, int]) -> list[str]:
+    """Return a warning when the rows are not all of one program."""
+    if len(made_by) < 2:
+        return []
+    parts = ", ".join(f"{count} by {name}" for name, count in made_by.items())
+    return [f"rows of {len(made_by)} programs are mixed: {parts}; a new --out has one only"]

@@ -13,12 +13,13 @@ import pytest
 from hil.analysis.metrics import METRICS
 from hil.core.errors import BadInput, RigFault
 from hil.runs.execute import RunSpec, execute
+from hil.study.campaign.cluster import on_dask
 from hil.study.campaign.findings import documents, outcomes_of, sentences
 from hil.study.campaign.maps import write_page
 from hil.study.campaign.plan import Campaign, load_campaign
 from hil.study.campaign.results import ResultStore
 from hil.study.campaign.work import Worker, run_campaign
-from hil.study.campaign.workers import in_processes, on_dask
+from hil.study.campaign.workers import in_processes
 from tests.sweep.deadly import DiesOnce, always_dies
 
 TEXT = """
