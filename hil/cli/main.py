@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import signal
 import sys
 from typing import NoReturn
 
@@ -11,6 +12,7 @@ import click
 
 from hil import __version__
 from hil.core.errors import HilError
+from hil.study.work_folder import Terminated
 
 # name -> (module, one-line help). The text stands here so that `hil --help` imports no command.
 COMMANDS = {
@@ -84,7 +86,10 @@ def main() -> NoReturn:
     except HilError as error:
         click.echo(f"hil: {error}", err=True)
         sys.exit(error.exit_status)
-    except (click.Abort, KeyboardInterrupt):
+    except (click.Abort, KeyboardInterrupt) as error:
+        if isinstance(error.__cause__ or error, Terminated):
+            click.echo("hil: stopped by SIGTERM", err=True)
+            sys.exit(128 + signal.SIGTERM)
         click.echo("hil: stopped by Ctrl-C", err=True)
         sys.exit(130)
     except BrokenPipeError:

@@ -6,8 +6,12 @@ import hashlib
 import json
 import multiprocessing
 import os
-from collections.abc import Callable, Sequence
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty
@@ -15,15 +19,26 @@ from random import Random
 from typing import TYPE_CHECKING, Any
 
 from hil.config.load import load_scenario
-from hil.core.errors import BadInput
+from hil.core.errors import BadInput, RigFault
 from hil.record import layout
-from hil.record.manifest import read_manifest, replace_file
+from hil.record.manifest import Manifest, read_manifest, replace_file
+from hil.record.reader import altered_files
 from hil.report.circle import CircleStudy
 from hil.report.compare import compare_runs, refuse_other_task, to_json
 from hil.report.repeats import Repeats, repeats_of
 from hil.rigs.opening import SIMULATED
 from hil.runs.execute import INNER_LAWS, RunSpec, camera_for
 from hil.study import ideal_circle
+from hil.study.work_folder import (
+    LOCK,
+    SET_ASIDE,
+    Terminated,
+    is_new,
+    set_aside,
+    sigterm_stops,
+    sole_writer,
+)
+from hil.study.workers import when_parent_is_gone
 
 if TYPE_CHECKING:
     from multiprocessing.queues import Queue
@@ -34,10 +49,18 @@ if TYPE_CHECKING:
 
 Update = Callable[[str, float], None]
 PLAN = "experiment.json"
+REPORT = "report.html"
 _REPORT_PERIOD_S = 0.5
 _POLL_S = 0.1
+# Tries of a simulated run whose worker is killed, and what a run has to stop when its parent is gone.
+_MOST_TRIES = 3
+_STOP_S = 10.0
+# Files whose loss costs a look at a run and not the run.
+_TO_LOOK_AT = (layout.RERUN, layout.CAMERA, layout.PICTURES)
 
 _news: Queue[tuple[str, float]] | None = None
+_idle = threading.Event()
+_interrupted = threading.Event()
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,25 +122,51 @@ def deck_specs(deck: Deck, conditions: Conditions, folder: Path) -> list[RunSpec
     return specs
 
 
-def claim(folder: Path, specs: Sequence[RunSpec]) -> list[RunSpec]:
+@contextmanager
+def writing(folder: Path) -> Iterator[None]:
+    """Hold an experiment's folder for this process; raises BadInput when another one has it.
+
+    SIGTERM is taken like Ctrl-C meanwhile: running robots are stopped and their records closed.
+    """
+    if not folder.is_dir():  # made, or refused, by `claim`
+        claim(folder, [])
+    with sole_writer(folder / LOCK, f"--out {folder}"), sigterm_stops():
+        yield
+
+
+def claim(
+    folder: Path, specs: Sequence[RunSpec], say: Callable[[str], None] = lambda _text: None
+) -> list[RunSpec]:
     """Make the experiment's folder, or take up an interrupted one; return the runs still to do.
 
-    A run that did not come to its end is set aside and done anew. Raises BadInput when the folder
-    holds anything else than this very experiment (more repeats than before are welcome).
+    A run that did not come to its end, or whose record was damaged since, is set aside and done
+    anew; `say` is told of the latter. Raises BadInput when the folder holds anything else than this
+    very experiment (more repeats than before are welcome).
     """
     plan = {"format": "hil-experiment-1", "runs": [_identity(spec) for spec in specs]}
     path = folder / PLAN
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        _refuse_other_plan(folder, plan)
-    else:
+    if is_new(folder, PLAN):
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise BadInput(f"--out {folder}: cannot be made: {error.strerror}") from None
+    else:
+        _refuse_other_plan(folder, plan, specs, say)
     replace_file(path, json.dumps(plan, indent=1).encode() + b"\n")
-    todo = [spec for spec in specs if not _ended(spec)]
-    for spec in todo:
-        _set_aside(spec.out)
+    return _to_do(specs, say)
+
+
+def _to_do(specs: Sequence[RunSpec], say: Callable[[str], None]) -> list[RunSpec]:
+    """Return the runs that are not there whole; what is there of them is set aside."""
+    todo = []
+    for spec in specs:
+        reason = _unfinished(spec.out)
+        if reason is None:
+            continue
+        todo.append(spec)
+        if spec.out.exists():
+            aside = set_aside(spec.out, spec.out.parent)
+            say(f"{spec.out}: {reason}; moved to {aside}, done anew")
     return todo
 
 
@@ -135,14 +184,16 @@ def _identity(spec: RunSpec) -> dict[str, Any]:
     }
 
 
-def _refuse_other_plan(folder: Path, plan: dict[str, Any]) -> None:
+def _refuse_other_plan(
+    folder: Path, plan: dict[str, Any], specs: Sequence[RunSpec], say: Callable[[str], None]
+) -> None:
+    known = plan["runs"]
     try:
         old = json.loads((folder / PLAN).read_bytes())["runs"]
     except (OSError, ValueError, KeyError, TypeError):
-        raise BadInput(
-            f"--out {folder}: exists and is neither empty nor an experiment; name a new one"
-        ) from None
-    known = plan["runs"]
+        _refuse_other_records(folder, specs)
+        say(f"{folder / PLAN}: damaged or lost, made anew from the records beside it")
+        return
     for run in old:
         if run not in known:
             raise BadInput(
@@ -151,22 +202,47 @@ def _refuse_other_plan(folder: Path, plan: dict[str, Any]) -> None:
             )
 
 
-def _ended(spec: RunSpec) -> bool:
-    """Say whether the run of a spec is there and came to an end of its own."""
-    if not (spec.out / layout.MANIFEST).is_file():
-        return False
-    return read_manifest(spec.out).outcome in {"complete", "fault"}
+def _refuse_other_records(folder: Path, specs: Sequence[RunSpec]) -> None:
+    """Raise BadInput unless the folder holds records of these specs and nothing else."""
+    runs = {spec.out.name: spec for spec in specs}
+    ours = {PLAN, f"{PLAN}.part", SET_ASIDE, REPORT, LOCK, *runs}
+    found = {item.name for item in folder.iterdir()} if folder.is_dir() else {""}
+    records = [name for name in runs if name in found]
+    if not found <= ours or not (records or PLAN in found):
+        raise BadInput(
+            f"--out {folder}: exists and is neither empty nor an experiment; name a new one"
+        )
+    for name in records:
+        manifest = _manifest(runs[name].out)
+        if manifest is not None and not _is_of(manifest, runs[name]):
+            raise BadInput(
+                f"--out {folder}: its {PLAN} is damaged and its run {name!r} is not one of this "
+                "command's; give the command that began it, or name a new folder"
+            )
 
 
-def _set_aside(folder: Path) -> None:
-    if not folder.exists():
-        return
-    aside = folder.parent / "set-aside"
-    aside.mkdir(exist_ok=True)
-    number = 1
-    while (target := aside / f"{folder.name}-{number}").exists():
-        number += 1
-    folder.rename(target)
+def _is_of(manifest: Manifest, spec: RunSpec) -> bool:
+    names = ("target", "camera", "outer", "inner", "seed")
+    same = all(getattr(manifest, name) == getattr(spec, name) for name in names)
+    return same and manifest.scenario == json.loads(spec.scenario.model_dump_json())
+
+
+def _manifest(folder: Path) -> Manifest | None:
+    try:
+        return read_manifest(folder)
+    except BadInput:
+        return None
+
+
+def _unfinished(folder: Path) -> str | None:
+    """Return why the run of a folder has to be done, None when it is there whole."""
+    manifest = _manifest(folder)
+    if manifest is None:
+        return f"{layout.MANIFEST} is missing or damaged"
+    if manifest.outcome not in {"complete", "fault"}:
+        return "cut off before its end" if manifest.outcome == "running" else manifest.outcome
+    damaged = [line for line in altered_files(folder, manifest) if not line.startswith(_TO_LOOK_AT)]
+    return damaged[0] if damaged else None
 
 
 def run_name(spec: RunSpec) -> str:
@@ -177,19 +253,40 @@ def run_name(spec: RunSpec) -> str:
 def run_all(specs: Sequence[RunSpec], update: Update, workers: int | None = None) -> list[Path]:
     """Run every spec, `workers` at a time (one a core; a real rig: one), return their folders.
 
-    An error in one run ends the others and is raised here.
+    An error in one run ends the others and is raised here. Simulated runs whose worker process is
+    killed are done again; on a real rig, or when that does not help, RigFault is raised.
     """
-    if not specs:
-        return []
+    simulated = all(spec.target in SIMULATED for spec in specs)
+    todo = list(specs)
+    for tried in range(_MOST_TRIES):
+        if not todo:
+            break
+        try:
+            _run_side_by_side(todo, update, (workers or os.cpu_count() or 1) if simulated else 1)
+            break
+        except BrokenProcessPool:
+            if not simulated or tried + 1 == _MOST_TRIES:
+                raise RigFault(
+                    "a worker process died; out of memory? Finished runs are kept, the same "
+                    "command goes on"
+                ) from None
+            todo = _to_do(todo, lambda _text: None)
+    return [spec.out for spec in specs]
+
+
+def _run_side_by_side(specs: Sequence[RunSpec], update: Update, workers: int) -> None:
     context = multiprocessing.get_context("spawn")
     news: Queue[tuple[str, float]] = context.Queue()
-    simulated = all(not spec.target.startswith("serial") for spec in specs)
-    count = min((workers or os.cpu_count() or 1) if simulated else 1, len(specs))
-    pool = ProcessPoolExecutor(count, context, _start_worker, (news,))
+    pool = ProcessPoolExecutor(min(workers, len(specs)), context, _start_worker, (news,))
     try:
         futures = [pool.submit(_work, spec) for spec in specs]
         _follow(futures, news, update)
-        return [future.result() for future in futures]
+        for future in futures:
+            future.result()
+    except Terminated:  # Ctrl-C reaches the workers by itself
+        for process in multiprocessing.active_children():
+            os.kill(process.pid or os.getpid(), signal.SIGINT)
+        raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
@@ -208,13 +305,23 @@ def _follow(
 
 
 def _start_worker(news: Queue[tuple[str, float]]) -> None:
-    """Set a worker process up: progress goes to `news`."""
+    """Set a worker process up: progress goes to `news`; it ends with its parent, in good order."""
     global _news  # noqa: PLW0603 - the pool hands an initialiser's findings on in no other way
     _news = news
+    _idle.set()
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # the parent passes it on as Ctrl-C
+    when_parent_is_gone(_stop_run)
+
+
+def _stop_run() -> None:
+    """Stop the run of this process as Ctrl-C does, the robot first, and wait for its record."""
+    if not _idle.is_set():
+        os.kill(os.getpid(), signal.SIGINT)
+        _idle.wait(_STOP_S)
 
 
 def _work(spec: RunSpec) -> Path:
-    """Run one spec in this process."""
+    """Run one spec in this process; none any more after one was interrupted."""
     from hil.runs.execute import execute  # noqa: PLC0415 - in the worker only
 
     last_s = [0.0]
@@ -224,7 +331,16 @@ def _work(spec: RunSpec) -> Path:
             last_s[0] = t_s + _REPORT_PERIOD_S
             _news.put((run_name(spec), t_s))
 
-    return execute(spec, progress).path
+    if _interrupted.is_set():
+        raise KeyboardInterrupt
+    _idle.clear()
+    try:
+        record = execute(spec, progress)
+    finally:
+        _idle.set()
+    if record.manifest.outcome == "interrupted":
+        _interrupted.set()
+    return record.path
 
 
 @dataclass(frozen=True, slots=True)

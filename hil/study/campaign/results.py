@@ -24,12 +24,11 @@ from hil import __version__
 from hil.analysis.metrics import METRICS
 from hil.core.errors import BadInput, RigFault
 from hil.record.manifest import git_revision, replace_file
-from hil.sole_writer import LOCK
 from hil.study.campaign.plan import Campaign, Job
+from hil.study.work_folder import LOCK, SET_ASIDE, is_new, set_aside
 
 Row = dict[str, Any]
 CAMPAIGN, PARTS, RESULTS, PAGE = "campaign.json", "parts", "results.parquet", "report.html"
-SET_ASIDE = "set-aside"
 # Outcome of a run that raised or killed its workers: no answer, and tried again when going on.
 ERROR = "error"
 _OURS = {CAMPAIGN, PARTS, RESULTS, PAGE, SET_ASIDE, LOCK}
@@ -170,7 +169,7 @@ class ResultStore:
                 table = table.append_column("program", names)
             return table.select(self._schema.names).cast(self._schema)
         except (OSError, pa.ArrowException, KeyError, ValueError) as error:
-            aside = set_aside(file, self.folder / SET_ASIDE)
+            aside = set_aside(file, self.folder)
             self.notes.append(
                 f"{file}: damaged ({str(error).partition(chr(10))[0]}); moved to {aside}, its rows "
                 "are run again"
@@ -186,25 +185,6 @@ class ResultStore:
             part.unlink()
         (self.folder / PARTS).rmdir()
         return table
-
-
-def is_new(folder: Path, plan: str) -> bool:
-    """Say whether a folder holds nothing yet, or no more than a start cut off before its `plan`."""
-    if not folder.exists():
-        return True
-    if not folder.is_dir():
-        return False
-    return {item.name for item in folder.iterdir()} <= {f"{plan}.part", LOCK}
-
-
-def set_aside(path: Path, aside: Path) -> Path:
-    """Move a file or folder into the folder `aside` under a name of its own; return where it is."""
-    aside.mkdir(exist_ok=True)
-    number = 1
-    while (target := aside / f"{path.name}-{number}").exists():
-        number += 1
-    path.rename(target)
-    return target
 
 
 def programs(table: pa.Table) -> dict[str, int]:

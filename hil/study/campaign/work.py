@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.core.errors import BadInput, RigFault
-from hil.sole_writer import LOCK, sigterm_stops, sole_writer
 from hil.study.campaign.cluster import PROGRAM, on_dask
 from hil.study.campaign.plan import Campaign, Job
-from hil.study.campaign.results import CAMPAIGN, ERROR, ResultStore, Row, is_new, row_of
+from hil.study.campaign.results import CAMPAIGN, ERROR, ResultStore, Row, row_of
 from hil.study.campaign.workers import in_processes
+from hil.study.work_folder import LOCK, is_new, sigterm_stops, sole_writer
 
 if TYPE_CHECKING:
     import pyarrow as pa

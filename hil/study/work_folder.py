@@ -1,4 +1,4 @@
-"""One writer at a time for a folder or a file, and a stop by SIGTERM that tidies up like Ctrl-C.
+"""The folder of work that can be stopped and gone on with: one writer, damage set aside, SIGTERM.
 
 The lock is the system's own on a file beside what it guards: it ends with its process, however that
 dies, so nothing stale is left to be cleaned up by hand.
@@ -18,8 +18,28 @@ from typing import IO, Any
 
 from hil.core.errors import BadInput
 
-LOCK = ".lock"
+LOCK, SET_ASIDE = ".lock", "set-aside"
 _INTERRUPTED_AGAIN = 3
+
+
+def is_new(folder: Path, plan: str) -> bool:
+    """Say whether a folder holds nothing yet, or no more than a start cut off before its `plan`."""
+    if not folder.exists():
+        return True
+    if not folder.is_dir():
+        return False
+    return {item.name for item in folder.iterdir()} <= {f"{plan}.part", LOCK}
+
+
+def set_aside(path: Path, folder: Path) -> Path:
+    """Move what is damaged into `set-aside/` of a folder under a name of its own; return where."""
+    aside = folder / SET_ASIDE
+    aside.mkdir(exist_ok=True)
+    number = 1
+    while (target := aside / f"{path.name}-{number}").exists():
+        number += 1
+    path.rename(target)
+    return target
 
 
 class Terminated(KeyboardInterrupt):
