@@ -15,7 +15,7 @@ from tests.laws.test_tune import STILL, distance
 class Bowl:
     """Stands in for the twin; a worker process imports it from here."""
 
-    def __init__(self, target, camera):
+    def __init__(self, target, camera, tasks):
         self.name = (target, camera)
 
     def __call__(self, trial):
