@@ -42,6 +42,7 @@ from hil.study.workers import when_parent_is_gone
 
 if TYPE_CHECKING:
     from multiprocessing.queues import Queue
+    from multiprocessing.synchronize import Event
 
     from hil.config.deck import Deck
     from hil.record.reader import RunRecord
@@ -277,15 +278,15 @@ def run_all(specs: Sequence[RunSpec], update: Update, workers: int | None = None
 def _run_side_by_side(specs: Sequence[RunSpec], update: Update, workers: int) -> None:
     context = multiprocessing.get_context("spawn")
     news: Queue[tuple[str, float]] = context.Queue()
-    pool = ProcessPoolExecutor(min(workers, len(specs)), context, _start_worker, (news,))
+    stop = context.Event()
+    pool = ProcessPoolExecutor(min(workers, len(specs)), context, _start_worker, (news, stop))
     try:
         futures = [pool.submit(_work, spec) for spec in specs]
         _follow(futures, news, update)
         for future in futures:
             future.result()
     except Terminated:  # Ctrl-C reaches the workers by itself
-        for process in multiprocessing.active_children():
-            os.kill(process.pid or os.getpid(), signal.SIGINT)
+        stop.set()
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
@@ -304,17 +305,24 @@ def _follow(
             continue
 
 
-def _start_worker(news: Queue[tuple[str, float]]) -> None:
+def _start_worker(news: Queue[tuple[str, float]], stop: Event) -> None:
     """Set a worker process up: progress goes to `news`; it ends with its parent, in good order."""
     global _news  # noqa: PLW0603 - the pool hands an initialiser's findings on in no other way
     _news = news
     _idle.set()
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # the parent passes it on as Ctrl-C
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # the parent passes it on by `stop`
     when_parent_is_gone(_stop_run)
+    threading.Thread(target=_stop_when_told, args=(stop,), daemon=True).start()
+
+
+def _stop_when_told(stop: Event) -> None:
+    stop.wait()
+    _stop_run()
 
 
 def _stop_run() -> None:
     """Stop the run of this process as Ctrl-C does, the robot first, and wait for its record."""
+    _interrupted.set()
     if not _idle.is_set():
         os.kill(os.getpid(), signal.SIGINT)
         _idle.wait(_STOP_S)
@@ -331,10 +339,10 @@ def _work(spec: RunSpec) -> Path:
             last_s[0] = t_s + _REPORT_PERIOD_S
             _news.put((run_name(spec), t_s))
 
-    if _interrupted.is_set():
-        raise KeyboardInterrupt
     _idle.clear()
     try:
+        if _interrupted.is_set():
+            raise KeyboardInterrupt
         record = execute(spec, progress)
     finally:
         _idle.set()

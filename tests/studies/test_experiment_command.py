@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from hil.config.deck import load_deck
 from hil.record.manifest import read_manifest
+from hil.study.experiment import Conditions, claim, deck_specs, run_all
 from hil.study.work_folder import sole_writer
 from tests.studies.commands import hil, stopped
 
@@ -52,44 +54,45 @@ def test_bad_input_is_one_line(tmp_path: Path) -> None:
     assert not (tmp_path / "e").exists()
 
 
-@pytest.mark.parametrize(
-    ("file", "damage"),
-    [
-        ("samples.parquet", lambda path: path.write_bytes(path.read_bytes()[:2000])),
-        ("inputs.tape", lambda path: path.unlink()),
-        ("manifest.json", lambda path: path.write_bytes(b"")),
-        ("frames.parquet", lambda path: path.write_bytes(bytes(path.stat().st_size))),
-    ],
-    ids=["cut", "removed", "emptied", "zeroed"],
-)
-def test_damaged_record_is_made_anew(made: Path, tmp_path: Path, file: str, damage) -> None:
+def test_damaged_record_is_made_anew(made: Path, tmp_path: Path) -> None:
     """It is set aside and told; the record of the other law stays, the plan is made anew as well."""
     shutil.copytree(made, tmp_path, dirs_exist_ok=True)
     folder = tmp_path / "e"
     before = inodes(folder)
-    whole = (folder / RUNS[0] / "samples.parquet").read_bytes()
-    damage(folder / RUNS[0] / file)
+    samples = folder / RUNS[0] / "samples.parquet"
+    whole = samples.read_bytes()
+    samples.write_bytes(whole[:2000])
     (folder / "experiment.json").write_bytes(b"")
     said = hil(tmp_path, *WORDS, "--json")
     assert said.returncode == 1
-    assert f"e/{RUNS[0]}: {file}" in said.stderr
+    assert f"e/{RUNS[0]}: samples.parquet has 2000 bytes" in said.stderr
     assert "experiment.json: damaged or lost" in said.stderr
     assert "1 of 2 runs are there already" in said.stderr
     assert (folder / "set-aside" / f"{RUNS[0]}-1").is_dir()
-    after = inodes(folder)
-    assert after[1] == before[1]
-    assert (folder / RUNS[0] / "samples.parquet").read_bytes() == whole
+    assert inodes(folder)[1] == before[1]
+    assert samples.read_bytes() == whole
     assert json.loads((folder / "experiment.json").read_bytes())["runs"]
 
 
-def test_loss_of_what_is_only_looked_at_costs_no_run(made: Path, tmp_path: Path) -> None:
-    """The viewer's file may be deleted to save space."""
+@pytest.mark.parametrize(
+    ("file", "damage", "lost"),
+    [
+        ("inputs.tape", lambda path: path.unlink(), True),
+        ("manifest.json", lambda path: path.write_bytes(b""), True),
+        ("manifest.json", lambda path: path.unlink(), True),
+        ("frames.parquet", lambda path: path.write_bytes(bytes(path.stat().st_size)), True),
+        ("run.rrd", lambda path: path.unlink(), False),  # may be deleted to save space
+    ],
+)
+def test_what_a_damaged_file_costs(made: Path, tmp_path: Path, file: str, damage, lost) -> None:
+    """Its own run, unless it is only looked at; never another one."""
     shutil.copytree(made, tmp_path, dirs_exist_ok=True)
-    (tmp_path / "e" / RUNS[0] / "run.rrd").unlink()
-    before = inodes(tmp_path / "e")
-    said = hil(tmp_path, *WORDS)
-    assert "2 of 2 runs are there already" in said.stderr
-    assert inodes(tmp_path / "e") == before
+    conditions = Conditions("twin", "pose", "asg-ism", 1, 1, ("duration_s=0.6",), "test")
+    specs = deck_specs(load_deck(str(tmp_path / "deck.toml")), conditions, tmp_path / "e")
+    damage(tmp_path / "e" / RUNS[0] / file)
+    said: list[str] = []
+    assert claim(tmp_path / "e", specs, said.append) == (specs[:1] if lost else [])
+    assert [file in line for line in said] == ([True] if lost else [])
 
 
 def test_damaged_plan_of_another_experiment_is_not_taken_over(made: Path, tmp_path: Path) -> None:
@@ -112,19 +115,19 @@ def test_one_writer_at_a_time(made: Path, tmp_path: Path) -> None:
     assert "is writing there" in said.stderr
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL], ids=["TERM", "KILL"])
-def test_stopped_experiment_goes_on(tmp_path: Path, number: signal.Signals) -> None:
+def test_stopped_experiment_goes_on(tmp_path: Path) -> None:
     """Runs under way are stopped and closed, no worker is left, the same command does the rest."""
     (tmp_path / "deck.toml").write_text(DECK, encoding="utf-8")
     words = [*WORDS, "--repeats", "2"]
-    status, errors = stopped(tmp_path, words, number, workers=2)
-    assert status == (143 if number == signal.SIGTERM else -signal.SIGKILL)
-    assert "Traceback" not in errors
-    for manifest in (tmp_path / "e").glob("*/manifest.json"):
-        assert read_manifest(manifest.parent).outcome != "running"
-    said = hil(tmp_path, *words)
-    assert said.returncode == 1
-    assert (tmp_path / "e/report.html").is_file()
+    for number, expected in ((signal.SIGTERM, 143), (signal.SIGKILL, -signal.SIGKILL)):
+        status, errors = stopped(tmp_path, words, number, workers=2)
+        assert status == expected
+        assert "Traceback" not in errors
+        for manifest in (tmp_path / "e").glob("*/manifest.json"):
+            assert read_manifest(manifest.parent).outcome != "running"
+    conditions = Conditions("twin", "pose", "asg-ism", 1, 2, ("duration_s=0.6",), "test")
+    specs = deck_specs(load_deck(str(tmp_path / "deck.toml")), conditions, tmp_path / "e")
+    run_all(claim(tmp_path / "e", specs), lambda _name, _t_s: None)
     records = [read_manifest(p.parent) for p in (tmp_path / "e").glob("scenario-*/manifest.json")]
     assert sorted((r.outer, r.seed) for r in records) == [
         ("asg-ism", 1), ("asg-ism", 2), ("pid", 1), ("pid", 2),
