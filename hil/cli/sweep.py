@@ -28,8 +28,10 @@ def command(
     seeds and all laws; runs are kept in memory, one row each goes to results.parquet.
 
     However a campaign was stopped, the same command with the same --out goes on; a row that was lost
-    with a damaged file is made again. Exit status 3 when not one run came to its end (2 when all were
-    refused).
+    with a damaged file is made again.
+
+    Exit status: 0 when every run met its requirements, 1 when one did not, 3 when one ended early
+    by a fault (outside the fence, robot not seen, board stopped).
     """
     from hil.cli.progress import job_progress
     from hil.record.manifest import command_line
@@ -49,6 +51,9 @@ def command(
     outcomes = outcomes_of(campaign, table)
     page = folder / PAGE
     write_page(page, outcomes, command_line(), [*notes, *(f"Made by {name}." for name in made_by)])
+    ended, kept = table["outcome"].to_pylist(), table["holds"].to_pylist()
+    held, early = sum(kept), sum(outcome != "complete" for outcome in ended)
+    status = 3 if {"fault", "error"} & set(ended) else int(held < len(kept))
     efficiency = totals.efficiency
     document: dict[str, Any] = {
         "campaign": campaign.file.name,
@@ -60,16 +65,18 @@ def command(
         "wall_s": round(totals.wall_s, 3),
         "workers": totals.workers,
         "parallel_efficiency": round(efficiency, 4) if efficiency is not None else None,
-        "ended_early": ends,
+        "requirements_hold": held,
+        "ended_early": early,
+        "endings": ends,
         "programs": made_by,
         "answers": list(documents(outcomes)),
     }
-    status = 0 if outcomes.complete.any() else 2 if set(ends) == {"refused"} else 3
     if as_json:
         print_json(document)
         return status
     told = f", {efficiency:.0%} of the workers' time spent on runs" if efficiency else ""
     click.echo(f"{totals.runs} runs, {totals.runs_now} of them now in {totals.wall_s:.1f} s{told}")
+    click.echo(f"{held} of {totals.runs} runs met every requirement, {early} ended early")
     for line in notes:
         click.echo(f"note: {line}")
     for line in sentences(outcomes):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -57,8 +58,11 @@ class RunRecord:
     def link_stats(self) -> metrics.LinkStats:
         """Return the link counters kept in the manifest."""
         names = metrics.LinkStats.__dataclass_fields__
+        counted = self.manifest.link
         known = {
-            name: int(self.manifest.link[name]) for name in names if name in self.manifest.link
+            name: int(counted[name])
+            for name in names
+            if name in counted and math.isfinite(counted[name])
         }
         return metrics.LinkStats(**known)
 
@@ -107,7 +111,11 @@ def read_run(path: Path) -> RunRecord:
     missing = [name for name in SAMPLE_NAMES if name not in samples]
     if missing:
         raise BadInput(f"{path / layout.SAMPLES}: damaged: column {missing[0]} is missing")
-    frames = read_table(path, layout.FRAMES, layout.FRAMES_JOURNAL, required=False)
+    frames: Columns = {}
+    try:
+        frames = read_table(path, layout.FRAMES, layout.FRAMES_JOURNAL, required=False)
+    except BadInput as error:  # the samples are whole: what was seen is lost, the run is not
+        problems.append(str(error))
     return RunRecord(
         path=path,
         manifest=manifest,

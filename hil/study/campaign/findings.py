@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _BINS = 8
-_NO_RUNS = "no runs"
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,16 +113,14 @@ def documents(outcomes: Outcomes) -> Iterator[dict[str, Any]]:
                     "other": outcomes.labels[arm],
                     "baseline": outcomes.labels[0],
                     "stations": [
-                        _station(
-                            figure, station.value, outcomes.difference(figure, arm, station.pairs)
-                        )
+                        _told(figure, station, outcomes.difference(figure, arm, station.pairs))
                         for station in stations
                     ],
                 }
 
 
-def _station(figure: str, value: float | str, result: Paired) -> dict[str, Any]:
-    return {"value": value, "verdict": _verdict(figure, result)} | result.to_json()
+def _told(figure: str, station: Station, result: Paired) -> dict[str, Any]:
+    return {"value": station.value, "verdict": _verdict(figure, result)} | result.to_json()
 
 
 def sentences(outcomes: Outcomes) -> list[str]:
@@ -135,20 +132,17 @@ def sentences(outcomes: Outcomes) -> list[str]:
             for station in outcomes.stations(axis):
                 result = outcomes.difference(figure, arm, station.pairs)
                 said.setdefault(_verdict(figure, result), []).append(short(station.value))
-            none = said.pop(_NO_RUNS, [])
-            places = [f"{verdict} at {', '.join(at)}" for verdict, at in said.items()]
-            told = [f"is {'; '.join(places)}"] if places else []
-            told += [f"has no runs to compare at {', '.join(none)}"] if none else []
+            told = "; ".join(f"{verdict} at {', '.join(at)}" for verdict, at in said.items())
             lines.append(
                 f"{metric_of(figure).label} along {axis}: {outcomes.labels[arm]} against "
-                f"{outcomes.labels[0]} {'; '.join(told)}."
+                f"{outcomes.labels[0]} is {told}."
             )
     return lines
 
 
 def _verdict(figure: str, result: Paired) -> str:
-    if not result.pairs:
-        return _NO_RUNS
+    if result.pairs == 0:
+        return "without runs to compare"
     if not result.certain:
         return "not told apart"
     return "better" if (result.mean < 0) == (metric_of(figure).better == "lower") else "worse"
