@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -58,11 +57,8 @@ class RunRecord:
     def link_stats(self) -> metrics.LinkStats:
         """Return the link counters kept in the manifest."""
         names = metrics.LinkStats.__dataclass_fields__
-        counted = self.manifest.link
         known = {
-            name: int(counted[name])
-            for name in names
-            if name in counted and math.isfinite(counted[name])
+            name: int(self.manifest.link[name]) for name in names if name in self.manifest.link
         }
         return metrics.LinkStats(**known)
 
