@@ -14,11 +14,20 @@ from tests.studies.commands import hil
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with a run of each law, 1 s long, and one of 0.5 s."""
+    """Return a folder with a run of each law, 1 s long, and a log of 0.5 s."""
     folder = tmp_path_factory.mktemp("runs")
-    for name, law, duration_s in (("a", "asg-ism", 1), ("b", "pid", 1), ("short", "pid", 0.5)):
+    for name, law in (("a", "asg-ism"), ("b", "pid")):
         hil(folder, "run", "scenario-1", "--camera", "pose", "--outer", law, "--out", name,
-            "--set", f"duration_s={duration_s}", "--set", "requirements=[]")  # fmt: skip
+            "--set", "duration_s=1", "--set", "requirements=[]")  # fmt: skip
+    rows = [f"{0.05 * n:.2f},{-0.6 + 0.01 * n:.2f},-0.35,0.5" for n in range(11)]
+    (folder / "log.csv").write_text("\n".join(["t,x,y,theta", *rows]), encoding="utf-8")
+    (folder / "map.toml").write_text(
+        'outer = "pid"\nset = ["duration_s=1", "requirements=[]"]\nt = { column = "t" }\n[columns]\n'
+        'est_x_m = { column = "x" }\nest_y_m = { column = "y" }\n'
+        'est_theta_rad = { column = "theta" }\n',
+        encoding="utf-8",
+    )
+    hil(folder, "import", "log.csv", "--map", "map.toml", "--out", "short")
     return folder
 
 
