@@ -64,6 +64,9 @@ def in_processes(
                 else:
                     lost_in_a_row += 1
                     yield _given_up(job, deaths[repr(job)], lost, lost_in_a_row)
+        except KeyboardInterrupt:
+            _end_workers()
+            raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
@@ -113,8 +116,10 @@ class Pool:
         """Return the pool."""
         return self
 
-    def __exit__(self, *_exc: object) -> None:
+    def __exit__(self, kind: object, *_exc: object) -> None:
         """Give up what is not done and end the workers."""
+        if kind is not None:
+            _end_workers()
         self._pool.shutdown(wait=True, cancel_futures=True)
 
     def map(self, jobs: Sequence[Any], done: Callable[[int, Any], None]) -> list[Any]:
@@ -138,6 +143,12 @@ class Pool:
             f"worker processes died {_MOST_DEATHS} times; out of memory? fewer --workers need less. "
             "What was found is kept, the same command goes on"
         )
+
+
+def _end_workers() -> None:
+    """End this process's workers at once: their jobs leave nothing behind."""
+    for process in multiprocessing.active_children():
+        process.terminate()
 
 
 def _workers(count: int) -> ProcessPoolExecutor:
