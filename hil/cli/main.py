@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import signal
 import sys
 from typing import NoReturn
 
@@ -13,6 +14,7 @@ from hil import __version__
 from hil.core.errors import HilError
 from hil.core.text import visible
 from hil.runs.interruption import end_as_by_ctrl_c
+from hil.study.work_folder import Terminated
 
 # name -> (module, one-line help). The text stands here so that `hil --help` imports no command.
 COMMANDS = {
@@ -87,7 +89,10 @@ def main() -> NoReturn:
     except HilError as error:
         click.echo(f"hil: {visible(str(error))}", err=True)
         sys.exit(error.exit_status)
-    except (click.Abort, KeyboardInterrupt):
+    except (click.Abort, KeyboardInterrupt) as error:
+        if isinstance(error.__cause__ or error, Terminated):
+            click.echo("hil: stopped by SIGTERM", err=True)
+            sys.exit(128 + signal.SIGTERM)
         click.echo("hil: stopped by Ctrl-C", err=True)
         sys.exit(130)
     except BrokenPipeError:

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 @click.option("--elf", is_flag=True,
               help="As --firmware, through the board's own binary on a simulated processor.")  # fmt: skip
 @click.option("--fit", is_flag=True,
-              help="Also fit a twin to RUN and run the other law on it, in closed loop.")  # fmt: skip
+              help="Also fit a twin to RUN and run another law on it, in closed loop: that of --outer, "
+              "--inner and --set, else the other outer law.")  # fmt: skip
 @set_option
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
               help="Folder for replay.json and replayed.parquet; must not exist or be empty.")  # fmt: skip
@@ -63,7 +64,8 @@ def command(
     from hil.replays.output import claim_folder, write_output
     from hil.replays.what_if import what_if
 
-    duration_s = float(read_manifest(run).scenario.get("duration_s", 0.0))
+    told = read_manifest(run).scenario.get("duration_s")
+    duration_s = float(told) if isinstance(told, int | float) else 0.0  # for the bar; replay checks
     through = elf_firmware() if elf else core()
     if out is not None:
         claim_folder(out)
@@ -78,7 +80,7 @@ def command(
     board_changes = [text for text in overrides if text.startswith("board.")]
     asked = firmware or elf or inner or board_changes
     wheels = replay_wheels(run, inner, board_changes, through) if asked else None
-    answer = what_if(run, outer, overrides) if fit else None
+    answer = what_if(run, outer, overrides, inner=inner) if fit else None
     document = report.to_json() | {
         "firmware": wheels.to_json() if wheels else None,
         "fitted_twin": answer.to_json() if answer else None,

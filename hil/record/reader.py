@@ -112,7 +112,11 @@ def read_run(path: Path) -> RunRecord:
     missing = [name for name in SAMPLE_NAMES if name not in samples]
     if missing:
         raise BadInput(f"{path / layout.SAMPLES}: damaged: column {missing[0]} is missing")
-    frames = read_table(path, layout.FRAMES, layout.FRAMES_JOURNAL, required=False)
+    frames: Columns = {}
+    try:
+        frames = read_table(path, layout.FRAMES, layout.FRAMES_JOURNAL, required=False)
+    except BadInput as error:  # the samples are whole: what was seen is lost, the run is not
+        problems.append(str(error))
     return RunRecord(
         path=path,
         manifest=manifest,

@@ -48,6 +48,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
 _BOUNDS = (0.6, 1.6)
 # A ratio that is known no better than this, or only as beyond the bounds, is not told by the record.
 _KNOWN = 0.1
+_MOST_EVALUATIONS = 15
 # Quantised counts make the residual rough on a small scale: differences are taken over 2 %.
 _STEP = 0.02
 _SPAN, _SPAN_TIE_S = 0.06, 0.01  # and over twice these for the intervals
@@ -82,6 +83,23 @@ class Fit:
     residual_fitted: dict[str, float]
     residual_held_out: dict[str, float]
     residual_unfitted: dict[str, float]
+    converged: bool = True
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Return what limits the ratios: the edge of the box that was searched, its budget."""
+        margin = 0.01 * (_BOUNDS[1] - _BOUNDS[0])
+        found = [
+            f"{group} = {value:.3f} lies at the edge of what is searched "
+            f"({_BOUNDS[0]:g} to {_BOUNDS[1]:g}): the true ratio may be beyond"
+            for group, (value, _, _) in self.ratios.items()
+            if not _BOUNDS[0] + margin < value < _BOUNDS[1] - margin
+        ]
+        if not self.converged:
+            found.append(
+                f"the search ended by its budget of {_MOST_EVALUATIONS} evaluations, not by itself"
+            )
+        return tuple(found)
 
     @property
     def mismatch(self) -> dict[str, float]:
@@ -105,6 +123,9 @@ class Fit:
                 }
                 for group, (value, low, high) in self.ratios.items()
             },
+            "searched": list(_BOUNDS),
+            "converged": self.converged,
+            "notes": list(self.notes),
             "camera_tie_s": self.camera_tie_s,
             "windows_fitted": self.windows_fitted,
             "windows_held_out": self.windows_held_out,
@@ -260,7 +281,7 @@ def fit_twin(rehearsal: Rehearsal) -> Fit:
     high = [_BOUNDS[1]] * len(names) + [_CLOCK_TIE_BOUND_S]
     found = least_squares(
         residual, start, bounds=(low, high), diff_step=[_STEP] * len(names) + [0.1],
-        x_scale=[0.1] * len(names) + [0.01], loss="soft_l1", max_nfev=15,
+        x_scale=[0.1] * len(names) + [0.01], loss="soft_l1", max_nfev=_MOST_EVALUATIONS,
     )  # fmt: skip
     seen, unseen = _rms(difference(found.x, fitted)), _rms(difference(found.x, held_out))
     reach = _reach(
@@ -277,6 +298,7 @@ def fit_twin(rehearsal: Rehearsal) -> Fit:
         residual_fitted=seen,
         residual_held_out=unseen,
         residual_unfitted=_rms(difference(np.append(start[:-1], found.x[-1]), held_out)),
+        converged=found.status > 0,
     )
 
 

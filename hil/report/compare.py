@@ -39,6 +39,8 @@ HEADLINES = {
     "theta_dot_variation_rad_s": "command smoothness",
     "pwm_variation_counts": "PWM chatter",
 }
+# Share by which two runs may differ in length and still be set against each other.
+_EQUAL_LENGTH = 0.05
 _EQUAL_RATIO = 1.05
 
 
@@ -167,10 +169,24 @@ def _warnings(entries: Sequence[Entry]) -> list[str]:
         for key, here, there in differences(first.scenario, other.scenario):
             text = f"{key} {_short(there)} against {_short(here)} ({entries[0].label})"
             lines.append(f"{entry.label}: {text}")
+    lines += _lengths(entries)
     bases = {entry.figures.basis for entry in entries if entry.run.samples["t_s"].size}
     if len(bases) > 1:
         lines.append("figures rest on the truth in some runs and on the estimate in others")
     return lines
+
+
+def _lengths(entries: Sequence[Entry]) -> list[str]:
+    """Return a line for each run that covers another time than the first one."""
+    ends_s = [float(entry.run.samples["t_s"][-1]) if entry.run.samples["t_s"].size else 0.0
+              for entry in entries]  # fmt: skip
+    first = entries[0].label
+    return [
+        f"{entry.label}: covers {end_s:.3g} s against {ends_s[0]:.3g} s ({first}): errors, energies and "
+        "variations add up over time and cannot be set against each other"
+        for entry, end_s in zip(entries[1:], ends_s[1:], strict=True)
+        if abs(end_s - ends_s[0]) > _EQUAL_LENGTH * max(end_s, ends_s[0])
+    ]
 
 
 def _flaws(entry: Entry) -> list[str]:

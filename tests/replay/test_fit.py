@@ -110,7 +110,27 @@ def test_answer_carries_its_checks(made: Path, fit: Fit, monkeypatch: pytest.Mon
     assert ise.baseline_mean == pytest.approx(answer.in_record["ise_m2_s"], rel=0.1)
     assert ise.pairs == 3
     assert "held out" in answer.text()
+    # Without a word on the laws it is the other outer law; --inner is another wheel law.
+    monkeypatch.setattr("hil.replays.what_if.SEEDS", 2)
+    other = what_if(made, None, fit=fit)
+    assert (other.recorded_law, other.other_law) == ("pid", "asg-ism")
+    assert other.answers["ise_m2_s"].mean != 0.0
+    wheels = what_if(made, None, fit=fit, inner="pid")
+    assert (wheels.recorded_law, wheels.other_law) == ("pid over asg-ism", "pid over pid")
+    assert wheels.answers["ise_m2_s"].mean != 0.0
+    assert wheels.answers["ise_m2_s"].baseline_mean == other.answers["ise_m2_s"].baseline_mean
     assert answer.to_json()["fit"]["residual_rms"]["forward"]["held_out_parts"] > 0
+
+
+def test_ratio_at_the_edge_of_the_box_is_told(fit: Fit) -> None:
+    """As is a search that its budget ended; a ratio well inside is not."""
+    inside = dataclasses.replace(fit, converged=True)
+    assert not any("wheel radius" in line for line in inside.notes)
+    value = (1.598, 1.222, 1.974)
+    edge = dataclasses.replace(fit, ratios=fit.ratios | {"wheel radius": value}, converged=False)
+    assert edge.notes[0].startswith("wheel radius = 1.598 lies at the edge of what is searched")
+    assert "budget of 15 evaluations" in edge.notes[-1]
+    assert edge.to_json()["notes"] == list(edge.notes)
 
 
 def test_record_of_a_robot_at_rest_is_refused(tmp_path: Path) -> None:

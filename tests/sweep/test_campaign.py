@@ -10,6 +10,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
+from pydantic import ValidationError
 
 from hil.config.load import builtin_names
 from hil.core.errors import BadInput
@@ -67,7 +68,9 @@ def test_ranges_and_distributions() -> None:
     logs = [math.log10(loguniform.draw(rng)) for _ in range(2000)]
     assert statistics.fmean(logs) == pytest.approx(-1.0, abs=0.05)
     normal = Distribution(kind="normal", mean=1, sd=0.5, low=0)
-    assert min(normal.draw(rng) for _ in range(2000)) == 0
+    drawn = [normal.draw(rng) for _ in range(2000)]
+    assert min(drawn) > 0
+    assert len(set(drawn)) == 2000
 
 
 @pytest.mark.parametrize(
@@ -153,3 +156,18 @@ def test_built_in_campaigns_are_sound():
     found = {name: load_campaign(name) for name in builtin_names("campaigns")}
     assert len(found["limits"].jobs()) == 10_000
     assert all(campaign.file.name == name for name, campaign in found.items())
+
+
+def test_bounded_normal_is_drawn_again_and_not_piled_up() -> None:
+    """Half of it lies below the bound: the mean of the rest is that of the cut-off normal.
+
+    Its density ratio at the bound, a = (0.9 - 1.0) / 0.4 = -0.25: mean 1 + 0.4 phi(a) / (1 - Phi(a)),
+    phi = 0.38667, Phi = 0.40129, which is 1.2583.
+    """
+    bounded = Distribution(kind="normal", mean=1.0, sd=0.4, low=0.9)
+    rng = Random(1)
+    values = [bounded.draw(rng) for _ in range(4000)]
+    assert values.count(0.9) == 0
+    assert statistics.fmean(values) == pytest.approx(1.2583, abs=0.015)
+    with pytest.raises(ValidationError, match="lies within low and high"):
+        Distribution(kind="normal", mean=0.0, sd=0.1, low=1.0)

@@ -121,11 +121,14 @@ def documents(outcomes: Outcomes) -> Iterator[dict[str, Any]]:
                     "other": outcomes.labels[arm],
                     "baseline": outcomes.labels[0],
                     "stations": [
-                        {"value": station.value}
-                        | outcomes.difference(figure, arm, station.pairs).to_json()
+                        _told(figure, station, outcomes.difference(figure, arm, station.pairs))
                         for station in stations
                     ],
                 }
+
+
+def _told(figure: str, station: Station, result: Paired) -> dict[str, Any]:
+    return {"value": station.value, "verdict": _verdict(figure, result)} | result.to_json()
 
 
 def sentences(outcomes: Outcomes) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import itertools
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -27,12 +28,16 @@ figcaption { font-size: .88rem; } pre { white-space: pre-wrap; } li { margin: .2
 """
 
 
-def write_page(path: Path, outcomes: Outcomes, command: str) -> None:
-    """Write the page, atomically; `command` is the command line that made it."""
+def write_page(path: Path, outcomes: Outcomes, command: str, notes: Sequence[str] = ()) -> None:
+    """Write the page, atomically; `command` is the command line that made it.
+
+    `notes` says how runs ended that have no figures, and which program made the rows.
+    """
     file = outcomes.campaign.file
     parts = [
         f"<h1>Campaign {html.escape(file.name)}</h1>",
         f"<p>{html.escape(_described(outcomes))}</p>",
+        *(f"<p>{html.escape(line)}</p>" for line in notes),
         "<ul>",
         *(f"<li>{html.escape(line)}</li>" for line in sentences(outcomes)),
         "</ul>",

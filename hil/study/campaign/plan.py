@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
+from statistics import NormalDist
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
@@ -24,6 +25,8 @@ from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME, Metric, require_known
 
 Point = dict[str, Any]
+# Share of a normal distribution that has to lie within its bounds: draws outside are drawn again.
+_LEAST_INSIDE = 1e-3
 InnerLawName = Literal["asg-ism", "pid"]
 
 
@@ -66,7 +69,10 @@ class Range(Section):
 
 
 class Distribution(Section):
-    """One value drawn per draw: uniform or log-uniform in low..high, or normal within them."""
+    """One value drawn per draw: uniform or log-uniform in low..high, or normal within them.
+
+    What falls outside low..high of a normal one is drawn again, so the bounds hold no pile of rows.
+    """
 
     kind: Literal["uniform", "loguniform", "normal"]
     low: float = -math.inf
@@ -84,6 +90,14 @@ class Distribution(Section):
             raise ValueError(f"{self.kind} needs low and high")
         if self.kind == "loguniform" and self.low <= 0:
             raise ValueError("loguniform needs low above 0")
+        if self.kind == "normal":
+            bell = NormalDist(self.mean, self.sd)
+            inside = bell.cdf(self.high) - bell.cdf(self.low)
+            if inside < _LEAST_INSIDE:
+                raise ValueError(
+                    f"normal: {inside:.2g} of it lies within low and high, at least "
+                    f"{_LEAST_INSIDE:g} is needed; move mean, or draw uniform"
+                )
         return self
 
     def draw(self, rng: Random) -> float:
@@ -92,7 +106,9 @@ class Distribution(Section):
             return rng.uniform(self.low, self.high)
         if self.kind == "loguniform":
             return math.exp(rng.uniform(math.log(self.low), math.log(self.high)))
-        return min(max(rng.gauss(self.mean, self.sd), self.low), self.high)
+        while not self.low <= (value := rng.gauss(self.mean, self.sd)) <= self.high:
+            continue  # drawn again: cut off at the bound, many rows would share one value
+        return value
 
 
 Axis = Annotated[Range | list[Any], Field(union_mode="left_to_right")]
