@@ -270,6 +270,17 @@ def project(lens: Array, place: Array, board_points: Array) -> Array:
     return points(px)
 
 
+def plane_map(points_xy: Array, px: Array) -> Array:
+    """Return the (3, 3) projective map from points of a plane, (N, 2), to pixels, (N, 2)."""
+    matrix, _ = cv2.findHomography(points_xy, px)
+    return np.eye(3) if matrix is None else np.asarray(matrix, dtype=np.float64)
+
+
+def mapped(matrix: Array, points_xy: Array) -> Array:
+    """Return points of a plane, (N, 2), under a projective map."""
+    return points(cv2.perspectiveTransform(points_xy.reshape(1, -1, 2), matrix))
+
+
 def rotation(vector: ArrayLike) -> Array:
     """Return the rotation matrix (3, 3) of a rotation vector (3,)."""
     matrix, _ = cv2.Rodrigues(np.asarray(vector, dtype=np.float64).reshape(3, 1))
