@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from hil.core.errors import BadInput, RigFault
 from hil.core.rig import Frame
+from hil.core.wording import past
 from vision import cv_compat
 from vision.frame_queue import FrameQueue
 from vision.video_file import VideoFile as VideoFile  # noqa: PLC0414 - beside the other sources
@@ -193,8 +194,8 @@ class LiveCamera:
         silence_s = self._clock() - self._newest_s
         if frame is None and silence_s > self._limit_s:
             raise RigFault(
-                f"{self.name}: no frame for {silence_s:.2f} s, limit {self._limit_s:g} s; check the"
-                " cable, and that exposure fits the frame rate"
+                f"{self.name}: no frame for {past(silence_s, self._limit_s, '.2f')} s, limit"
+                f" {self._limit_s:g} s; check the cable, and that exposure fits the frame rate"
             )
         return frame
 
@@ -235,6 +236,7 @@ class ImageFolder:
         self.path = folder
         self.files = image_files(folder)
         self.rate_hz = rate_hz
+        self.unstamped = 0
         self.count = len(self.files)
         first = cv_compat.read_image(self.files[0])
         self.height_px, self.width_px = first.shape[:2]
