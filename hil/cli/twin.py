@@ -71,7 +71,7 @@ def serve(
 def film(out: Path, duration_s: float, seed: int) -> None:
     """Film the robot driving a figure of eight, as the laboratory's camera sees it.
 
-    About 3 MB a second of film. `hil localise` reads it with the camera file of `hil twin samples`.
+    About 0.6 MB a second of film. `hil localise` reads it with the camera file of `hil twin samples`.
     """
     from hil.config.camera import CameraConfig
     from sim_twin.samples import write_film
