@@ -67,14 +67,14 @@ def lines(camera: CameraConfig) -> list[str]:
     """Return what a builder has to know of the marks, as short lines."""
     marks, look = camera.marks, camera.robot_look
     places = [
-        f"{name} ({mark.x_m * 1e3:g}, {mark.y_m * 1e3:g}) mm"
-        for name, mark in (("front mark, right", marks.front), ("rear mark, left", marks.rear))
+        f"{name} mark at x {mark.x_m * 1e3:g}, y {mark.y_m * 1e3:g} mm"
+        for name, mark in (("front", marks.front), ("rear", marks.rear))
     ]
     apart = (
         (marks.front.x_m - marks.rear.x_m) ** 2 + (marks.front.y_m - marks.rear.y_m) ** 2
     ) ** 0.5
     return [
-        f"{places[0]}, {places[1]} ahead and left of the cross: centre of mass, forward is right",
+        f"{places[0]}, {places[1]} from the cross (centre of mass): x forward, here to the right; y left, here up",
         f"diameter {marks.diameter_m * 1e3:g} mm, {apart * 1e3:g} mm apart, face up"
         f" {marks.height_m * 1e3:g} mm over the floor; plate {look.plate_length_m * 1e3:g} x"
         f" {look.plate_width_m * 1e3:g} mm, matt black",
