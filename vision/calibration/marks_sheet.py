@@ -74,7 +74,8 @@ def lines(camera: CameraConfig) -> list[str]:
         (marks.front.x_m - marks.rear.x_m) ** 2 + (marks.front.y_m - marks.rear.y_m) ** 2
     ) ** 0.5
     return [
-        f"{places[0]}, {places[1]} from the cross (centre of mass): x forward, here to the right; y left, here up",
+        f"{places[0]}, {places[1]} from the cross (centre of mass):"
+        " x forward, here to the right; y left, here up",
         f"diameter {marks.diameter_m * 1e3:g} mm, {apart * 1e3:g} mm apart, face up"
         f" {marks.height_m * 1e3:g} mm over the floor; plate {look.plate_length_m * 1e3:g} x"
         f" {look.plate_width_m * 1e3:g} mm, matt black",
