@@ -42,6 +42,7 @@ _interrupted = threading.Event()
 
 
 def manifest_of(folder: Path) -> Manifest | None:
+    """Return the manifest of a record, None where there is none that can be read."""
     try:
         return read_manifest(folder)
     except BadInput:

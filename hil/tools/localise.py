@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import time
 from collections import Counter, deque
 from dataclasses import dataclass
@@ -59,7 +60,8 @@ def localise(
     rows: list[tuple[Any, ...]] = []
     measured: list[PoseMeasurement] = []
     times_s: list[float] = []
-    with _Overlay(outputs.overlay, model, frames.rate_hz, config.marks.height_m) as overlay:
+    rate_hz = math.nan if outputs.overlay is None else frames.rate_hz
+    with _Overlay(outputs.overlay, model, rate_hz, config.marks.height_m) as overlay:
         for frame in frames.frames():
             assert frame.image is not None
             begin_s = time.perf_counter()
@@ -69,6 +71,7 @@ def localise(
             rows.append(_row(frame.index, frame.t_cam_s, seen))
             overlay.add(frame.index, frame.image, seen)
         document = _summary(source, measured, times_s)
+        document["unstamped"] = frames.unstamped
         overlay.keep()
     frames.close()
     if outputs.rows is not None:
@@ -145,6 +148,8 @@ def summary_text(document: dict[str, Any]) -> str:
         f"median quality {d['quality_median']:.2f}, sigma {d['sigma_xy_median_m'] * 1e3:.2f} mm;"
         f" {d['time_median_ms']:.1f} ms a frame, 99 % within {d['time_p99_ms']:.1f} ms",
     ]
+    if d["unstamped"]:
+        lines.append(f"{d['unstamped']} frames with the stamp of the one before were left out")
     lines += [f"not seen in {count}: {reason}" for reason, count in d["not_seen"].items()]
     lines += [f"written to {d[key]}" for key in ("rows", "overlay") if d[key]]
     return "\n".join(lines)
