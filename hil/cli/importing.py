@@ -16,14 +16,21 @@ from hil.cli.run import print_summary, summary
               help="What the log is of, and where each column comes from (docs/run-record.md).")  # fmt: skip
 @out_option
 @json_option
-def command(log: Path, mapping: Path | None, out: Path | None, as_json: bool) -> None:
-    """Make a run record of LOG, a MAVLink .tlog or a CSV file, that compare and view accept."""
+def command(log: Path, mapping: Path | None, out: Path | None, as_json: bool) -> int:
+    """Make a run record of LOG, a MAVLink .tlog or a CSV file, that compare and view accept.
+
+    What was left out, repaired or assumed is said on stderr and kept in the record. Exit status 1
+    when the log fails a requirement of its task.
+    """
     from hil.record.log_import import import_log
     from hil.record.manifest import command_line
-    from hil.runs.execute import new_folder
+    from hil.runs.execute import exit_status, new_folder
 
-    record = import_log(log, mapping, out or new_folder(log.stem), command_line())
+    made = import_log(log, mapping, out or new_folder(log.stem), command_line())
+    for note in made.notes:
+        click.echo(f"note: {note}", err=True)
     if as_json:
-        print_json(summary(record))
+        print_json(summary(made.record) | {"notes": list(made.notes)})
     else:
-        print_summary(record)
+        print_summary(made.record)
+    return exit_status(made.record)
