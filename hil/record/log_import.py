@@ -29,17 +29,17 @@ import numpy as np
 from hil.config.load import load_scenario
 from hil.control.estimators import BelievedGeometry
 from hil.control.references import make_reference
-from hil.foreign_csv import read_csv
-from hil.foreign_mapping import LogMapping, read_mapping
-from hil.foreign_signals import Signals
-from hil.foreign_tlog import read_tlog
+from hil.record.log_csv import read_csv
+from hil.record.log_mapping import LogMapping, read_mapping
+from hil.record.log_signals import Signals
+from hil.record.log_telemetry import read_tlog
 from hil.record.manifest import Manifest, collect_versions, git_revision
 from hil.record.recorder import Recorder
 from hil.record.schema import SAMPLE_NAMES
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
-    from hil.foreign_signals import Array
+    from hil.record.log_signals import Array
     from hil.record.reader import RunRecord
 
 # Faster than this no small wheeled robot drives: the rows are of two, or in another unit.

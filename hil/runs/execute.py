@@ -49,6 +49,7 @@ class RunSpec:
     seed: int
     out: Path
     record_camera: bool = False
+    small_video: bool = False
     rerun: bool = True
     command: str = ""
 
@@ -98,6 +99,7 @@ def execute(
             spec.out,
             make_manifest(spec),
             record_camera=spec.record_camera,
+            small_video=spec.small_video,
             frame_rate_hz=spec.scenario.camera.rate_hz,
             rerun=spec.rerun,
         )

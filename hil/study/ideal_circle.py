@@ -60,9 +60,12 @@ class Disturbances:
 NO_DISTURBANCE = Disturbances(0.0, 0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class IdealRun:
-    """Signals of one run, one entry a control step; s and psi are NaN for a law without them."""
+    """Signals of one run, one entry a control step; s and psi are NaN for a law without them.
+
+    Printed, it shows its figures and not its thousands of entries.
+    """
 
     t_s: list[float]
     z1_m: list[Vec2]
@@ -71,6 +74,12 @@ class IdealRun:
     s: list[Vec2]
     psi: list[Vec2]
     u: list[Vec2]  # (zeta in m/s^2, u2 in m/s^2)
+
+    def __repr__(self) -> str:
+        return (
+            f"IdealRun({len(self.t_s)} steps to {self.t_s[-1]:.6g} s, ISE {self.ise_m2_s:.4g} m^2 s, "
+            f"worst |delta1| of the last second {self.worst_m(1.0):.4g} m)"
+        )
 
     @property
     def ise_m2_s(self) -> float:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hil.core.errors import BadInput
-from hil.foreign_mapping import Disorder, Source
+from hil.record.log_mapping import Disorder, Source
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

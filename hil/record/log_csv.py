@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hil.core.errors import BadInput
-from hil.foreign_mapping import LogMapping
-from hil.foreign_signals import (
+from hil.record.log_mapping import LogMapping
+from hil.record.log_signals import (
     POSE,
     Signals,
     counter_hint,
@@ -32,7 +32,7 @@ from hil.foreign_signals import (
 )
 
 if TYPE_CHECKING:
-    from hil.foreign_signals import Array
+    from hil.record.log_signals import Array
 
 _DELIMITERS = (",", ";", "\t", "|")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")

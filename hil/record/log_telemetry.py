@@ -20,9 +20,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hil.core.errors import BadInput
-from hil.foreign_frames import Damage, Message, messages
-from hil.foreign_mapping import STANDARD, LogMapping, Source
-from hil.foreign_signals import (
+from hil.record.log_frames import Damage, Message, messages
+from hil.record.log_mapping import STANDARD, LogMapping, Source
+from hil.record.log_signals import (
     POSE,
     Signals,
     fall_text,
