@@ -14,9 +14,10 @@ import pytest
 from hil.config.deck import Deck
 from hil.core.errors import BadInput
 from hil.record.reader import RunRecord
+from hil.report.compare import HEADLINES
 from hil.report.csv_table import write_csv
 from hil.report.html import render
-from hil.report.repeats import HEADLINES, repeats_of, text_tables
+from hil.report.repeats import repeats_of, text_tables
 from hil.runs.execute import execute, execute_in_memory
 from hil.study.experiment import Conditions, claim, deck_specs, study
 
