@@ -61,7 +61,7 @@ class OuterLimits(Section):
 
 
 class AsgIsmGains(Section):
-    """Gains of backstepping with ASG-ISM (8.6)-(8.22), control.md section 2."""
+    """Gains of backstepping with ASG-ISM (8.6)-(8.22), corrected as in docs/control.md."""
 
     k1_s: float = Field(gt=0, le=100, description="1/s at p = 1, position error to speed")
     k2_s: float = Field(gt=0, le=100, description="1/s at p = 1, speed error to acceleration")
@@ -75,7 +75,7 @@ class AsgIsmGains(Section):
 
 
 class PidGains(Section):
-    """Gains of the state feedback in PID form on the linearised chain (control.md section 2)."""
+    """Gains of the state feedback in PID form on the linearised chain (docs/control.md section 1)."""
 
     kp_s3: float = Field(gt=0, le=1e6, description="1/s^3, on delta1")
     ki_s4: float = Field(0.0, ge=0, le=1e6, description="1/s^4, on the integral of delta1")

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 State = tuple[float, float, float, float, float]  # X, Y, theta, eta1, eta2
 
-# Section 8.9 as tried in control.md section 2. K places the poles of the state feedback at -2, -4
+# Section 8.9 as in docs/control.md section 6. K places the poles of the state feedback at -2, -4
 # (the k1, k2 of the backstepping stages) and -4.
 CIRCLE_GAINS = Gains(
     asg_ism=AsgIsmGains(
@@ -43,7 +43,7 @@ CIRCLE_LIMITS = OuterLimits(
     lead_s=0,
 )
 # X, Y, theta, eta1, eta2: 50 mm off the circle's start in X and in Y, heading theta*(0) = 0, and
-# the circle's own speed and turn rate. The first sentence of that is control.md's, the rest follows.
+# the circle's own speed and turn rate. The first sentence of that is the case chosen, the rest follows.
 CIRCLE_START: State = (0.05, 7.95, 0.0, 0.8, 0.03 * 0.1)
 
 
@@ -161,8 +161,8 @@ def run_ideal(
 ) -> IdealRun:
     """Run the loop; ends early once |delta1| exceeds `give_up_m` (the loop has diverged).
 
-    The law runs and the plant steps at `step_s`. 2e-3 s gives the figures of control.md section 2,
-    which were taken at 1e-4 s, to the digits printed there (docs/control.md has both).
+    The law runs and the plant steps at `step_s`. 2e-3 s gives the figures of docs/control.md section 6,
+    which were taken at 1e-4 s, to the digits printed there.
     """
     reference = make_reference(reference_config)
     x = start
@@ -189,7 +189,7 @@ def run_ideal(
 
 
 def run_circle(outer: str, disturbances: Disturbances = Disturbances()) -> IdealRun:
-    """Run section 8.9 with the law `outer`, as tried in control.md section 2 (80 s)."""
+    """Run section 8.9 with the law `outer`, as in docs/control.md section 6 (80 s)."""
     config = CircleReference()
     law = make_outer_law(outer, CIRCLE_GAINS, CIRCLE_LIMITS, config.d0_m)
     return run_ideal(law, config, CIRCLE_START, d0_m=config.d0_m, disturbances=disturbances)
