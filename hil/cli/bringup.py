@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING
 import click
 
 from hil.cli.options import json_option, print_json
-from hil.core.errors import BadInput
+from hil.core.errors import BadInput, RigFault
 
 if TYPE_CHECKING:
     from hil.config.robot import RobotConfig
     from hil.tools.bringup.result import Check, Report, Side
     from hil.tools.bringup.wiring import Seen
 
+_KEYS = "lf, lb, rf, rb, n, ?"
 _SEEN = "[lf] left forward, [lb] left backward, [rf] right forward, [rb] right backward, [n] none"
 
 
@@ -56,6 +57,7 @@ def command(
     device, baud = parse_target(target)
     if out is not None:
         check_out(out, robot)
+    _require_port(device)
     if not yes:
         _confirm()
     report = _run(device, baud, believed, 0.0 if yes else turns, yes)
@@ -69,6 +71,12 @@ def command(
         written = write_robot_file(out, robot, counts, report.measured, when)
         click.echo(f"{'written' if written else 'nothing measured, not written'}: {out}", err=True)
     return 0 if report.passed else 1
+
+
+def _require_port(device: str) -> None:
+    """Raise RigFault for a port that is not there, before anybody is asked anything."""
+    if device.startswith("/") and not Path(device).exists():
+        raise RigFault(f"port {device}: no such port; `hil doctor` lists the ports")
 
 
 def _run(device: str, baud: int, believed: RobotConfig, turns: float, yes: bool) -> Report:
@@ -112,6 +120,10 @@ def _ask(question: str) -> str:
     raise BadInput("bringup asks what the wheels do: run it in a terminal, or with --yes")
 
 
+def _told(answer: str) -> str:
+    return repr(answer) if answer else "an empty line"
+
+
 def _confirm() -> None:
     answer = _ask("The wheels will turn, up to full speed. Are ALL of them off the ground? [y/N]")
     if answer not in {"y", "yes"}:
@@ -138,6 +150,7 @@ class Person:
             answer = _ask(f"{driven} was driven. Which wheels turned? {_SEEN}, [?] not seen:")
             if answer in sides:
                 return sides[answer]
+            click.echo(f"{_told(answer)} is none of them; type one of {_KEYS}", err=True)
 
     def turns(self, side: Side, believed: float) -> float | None:
         """Ask for the number of turns counted."""
@@ -151,6 +164,7 @@ class Person:
             with suppress(ValueError):
                 if float(answer) > 0.0:
                     return float(answer)
+            click.echo(f"{_told(answer)} is no number of turns; type it, or ?", err=True)
 
 
 class Nobody:

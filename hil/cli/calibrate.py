@@ -25,7 +25,7 @@ FLOOR_HELD_OUT_MAX_MM = 20.0
 board_option = click.option(
     "--board", "board_text", default=BOARD, show_default=True, metavar="BOARD",
     help="charuco:COLUMNSxROWS:SQUARE_MM:MARKER_MM or chess:COLUMNSxROWS:SQUARE_MM, in squares; "
-    "sizes as measured on the print.",
+    "sizes as measured on the print. charuco-old: printed before OpenCV 4.6.",
 )  # fmt: skip
 detector_option = click.option(
     "--detector", type=click.Choice(["sector", "classic"]), default="sector", show_default=True,

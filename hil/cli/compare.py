@@ -55,8 +55,9 @@ def command(
         print_json(found.to_json())
         return
     print_study(found)
-    if report is not None:
-        click.echo(f"report: {report}")
+    for name, path in (("report", report), ("csv", csv_file), ("rerun", rerun)):
+        if path is not None:
+            click.echo(f"{name}: {path}")
 
 
 def print_study(study: Study) -> None:

@@ -154,5 +154,6 @@ def print_summary(record: RunRecord) -> None:
     )
     for item in record.verdicts():
         mark = "[green]holds[/green]" if item.holds else "[red]FAILS[/red]"
-        console.print(f"  {mark}  {item.text()}   (is {item.value:.4g})")
+        value = f"is {item.value:.4g}" if math.isfinite(item.value) else "has no value in this run"
+        console.print(f"  {mark}  {item.text()}   ({value})")
     console.print(f"record: {record.path}")

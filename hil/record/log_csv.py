@@ -148,6 +148,8 @@ def _chosen(table: Table, settings: LogMapping) -> Table:
 
 def _text(path: Path) -> str:
     data = read_bytes(path)
+    if b"\0" in data[:4096] and data[:2] not in {b"\xff\xfe", b"\xfe\xff"}:
+        raise BadInput(f"{path}: is binary, not CSV; a MAVLink log needs a name ending in .tlog")
     if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
         coding = "utf-16"
     else:

@@ -58,7 +58,7 @@ def import_log(log: Path, mapping: Path | None, out: Path, command: str) -> Impo
     """Make a run record of a foreign log in the new folder `out`; raises BadInput."""
     settings = read_mapping(mapping)
     scenario = load_scenario(_beside(mapping, settings.scenario), settings.set)
-    signals = read_tlog(log, settings) if log.suffix == ".tlog" else read_csv(log, settings)
+    signals = read_tlog(log, settings) if log.suffix.lower() == ".tlog" else read_csv(log, settings)
     columns = _completed(signals, scenario)
     notes = (*signals.notes, *_doubts(columns), *_assumed(settings, scenario, columns["t_s"]))
     recorder = Recorder(out, _manifest(log, scenario, settings, command))

@@ -105,6 +105,7 @@ def test_a_spreadsheet_with_decimal_commas(hil: Command, mark: str) -> None:
         ("t,x,y,x,theta\n0,0,0,0,0\n1,0,0,0,0\n", "2 columns are called 'x'"),
         ("t,x,y,theta\n", "no rows below it"),
         ("", "is empty"),
+        ("\0\1\2\3", "is binary, not CSV"),
         ("t,x,y,th\n0,0,0,0,9\n1,1,0,0,9\n", "5 cells, the heading has 4"),
         ("t,x,y,th\n0,0,0,0\n1,1,0,0\n", "no column 'theta'"),
         ("t,x,y,theta\n0,0,0,\n1,1,0,\n", "0 poses with a time of their own"),
