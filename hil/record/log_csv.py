@@ -63,8 +63,9 @@ class Table:
             return self.names.index(column)
         if count:
             raise BadInput(f"{self.path}: {count} columns are called {column!r}, {what} needs one")
-        known = ", ".join(name for name in self.names if name)
-        raise BadInput(f"{self.path}: has no column {column!r} for {what}; it has {known}")
+        raise BadInput(
+            f"{self.path}: has no column {column!r} for {what}; it has {_listed(self.names)}"
+        )
 
 
 def read_csv(path: Path, settings: LogMapping) -> Signals:
@@ -136,7 +137,7 @@ def _chosen(table: Table, settings: LogMapping) -> Table:
     kept = [k for k, row in enumerate(table.rows) if all(row[at] == text for at, text in wanted)]
     if not kept:
         asked = ", ".join(f"{name} = {text!r}" for name, text in settings.only.items())
-        found = ", ".join(sorted({row[wanted[0][0]] for row in table.rows})[:8])
+        found = _listed(tuple(sorted({row[wanted[0][0]] for row in table.rows})))
         raise BadInput(f"{table.path}: no row has {asked}; the first of them has: {found}")
     return Table(
         table.path,
@@ -187,8 +188,14 @@ def _read_table(path: Path, used: list[str]) -> Table:
         rows.append((*row[: len(names)], *[""] * (len(names) - len(row))))
         lines.append(line + skipped)
     if not rows:
-        raise BadInput(f"{path}: has a heading ({', '.join(names)}) and no rows below it")
+        raise BadInput(f"{path}: has a heading ({_listed(names)}) and no rows below it")
     return Table(path, names, tuple(rows), tuple(lines))
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    """Return the names of columns for a message: on one line, control characters visible."""
+    shown = [repr(name[:30])[1:-1] for name in names[:20] if name]
+    return ", ".join(shown) + (", ..." if len(names) > 20 else "")
 
 
 def _cells_of(path: Path, text: str, delimiter: str) -> Iterator[tuple[tuple[str, ...], int]]:
@@ -202,7 +209,7 @@ def _cells_of(path: Path, text: str, delimiter: str) -> Iterator[tuple[tuple[str
 
 def _delimiter(text: str, used: list[str]) -> str:
     """Return the mark that gives the heading the most of the wanted names, then most columns."""
-    line = text.partition("\n")[0]
+    line = text.splitlines()[0] if text else ""
 
     def found(mark: str) -> tuple[int, int]:
         names = [name.strip() for name in next(csv.reader([line], delimiter=mark), [])]

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 POSE = ("est_x_m", "est_y_m", "est_theta_rad")
 MOST_BYTES = 256_000_000
+_STRAY_SHARE = 0.01
 _COUNTERS = (2.0**16, 2.0**24, 2.0**31, 2.0**32)
 
 
@@ -76,21 +77,43 @@ def in_order(
 ) -> tuple[Places, list[str]]:
     """Return the places of finite times in ascending order, and what was done to have it.
 
-    `refusal(k)` is the line for time falling back at place k. Raises BadInput.
+    `refusal(k)` is the line for time falling back at place k. A single time outside those of its
+    neighbours is left out (a damaged stamp), unless there are many. Raises BadInput.
     """
     places = np.flatnonzero(np.isfinite(t_s))
-    falls = np.flatnonzero(np.diff(t_s[places]) < 0.0)
-    if not falls.size:
-        return places, []
-    first = int(places[falls[0] + 1])
-    if disorder == "refuse":
-        raise BadInput(refusal(first))
     if disorder == "sort":
+        falls = int(np.count_nonzero(np.diff(t_s[places]) < 0.0))
         ordered: Places = places[np.argsort(t_s[places], kind="stable")]
-        return ordered, [f"time falls back {falls.size} times: {what} sorted by their time"]
-    kept = places[: falls[0] + 1]
+        said = f"time falls back {falls} times: {what} sorted by their time"
+        return ordered, [said] if falls else []
+    stray = _strays(t_s[places])
+    notes = []
+    if 0 < stray.size <= max(1.0, _STRAY_SHARE * places.size):
+        where = t_s[places[stray[0]]]
+        notes.append(
+            f"{stray.size} of {places.size} {what} have a time outside those of their neighbours "
+            f"(the first {where:.6g} s): left out"
+        )
+        places = np.delete(places, stray)
+    falls_at = np.flatnonzero(np.diff(t_s[places]) < 0.0)
+    if not falls_at.size:
+        return places, notes
+    if disorder == "refuse":
+        raise BadInput(refusal(int(places[falls_at[0] + 1])))
+    kept = places[: falls_at[0] + 1]
     left = places.size - kept.size
-    return kept, [f"time falls back: cut there, {left} of {places.size} {what} left out"]
+    notes.append(f"time falls back: cut there, {left} of {places.size} {what} left out")
+    return kept, notes
+
+
+def _strays(t_s: Array) -> Places:
+    """Return the places of single times that lie outside those before and after them."""
+    if t_s.size < 3:
+        return np.zeros(0, dtype=np.intp)
+    before, here, after = t_s[:-2], t_s[1:-1], t_s[2:]
+    stray = (after >= before) & ((here > after) | (here < before))
+    stray[1:] &= ~stray[:-1]
+    return np.flatnonzero(stray) + 1
 
 
 def fall_text(before_s: float, after_s: float) -> str:

@@ -48,6 +48,17 @@ def test_time_that_falls_back_is_cut_when_asked(hil: Command) -> None:
     assert speeds("run") == pytest.approx(np.full(150, 0.3), abs=1e-3)
 
 
+@pytest.mark.parametrize("wrong_s", [-3.0, 4000.0])
+def test_one_damaged_time_costs_its_row(hil: Command, wrong_s: float) -> None:
+    """A single time outside those of its neighbours is left out and said; two halves are not."""
+    rows = [(wrong_s if k == 77 else t, *pose) for k, (t, *pose) in enumerate(arc_rows())]
+    write_rows(Path("log.csv"), rows)
+    status, _, err = hil("import", "log.csv", "--map", "log.toml", "--out", "run")
+    assert status == 0
+    assert "1 of 200 rows have a time outside those of their neighbours" in err
+    assert speeds("run") == pytest.approx(np.full(199, 0.3), abs=2e-3)
+
+
 def test_shuffled_rows_are_sorted_when_asked(hil: Command) -> None:
     rows = arc_rows()
     write_rows(Path("log.csv"), rows[100:] + rows[:100])
@@ -205,6 +216,18 @@ def test_one_of_several_vehicles(hil: Command) -> None:
     assert speeds("run") == pytest.approx(np.full(200, 0.3), abs=1e-3)
     Path("log.toml").write_text('only = { id = "4" }\n' + MAP, encoding="utf-8")
     assert "no row has id = '4'" in hil("import", "log.csv", "--map", "log.toml")[2]
+
+
+def test_a_figure_without_a_value_is_said(hil: Command) -> None:
+    """A robot that never comes near: the requirement fails in words, with status 1 and null."""
+    write_rows(Path("log.csv"), arc_rows())
+    far = 'requirements=[{metric=\\"settling_20mm_s\\", max=5.0}]'
+    mapping = MAP.replace('set = ["requirements=[]"]', f'set = ["{far}"]')
+    Path("log.toml").write_text(mapping, encoding="utf-8")
+    status, out, _ = hil("import", "log.csv", "--map", "log.toml", "--out", "run")
+    assert status == 1
+    assert "has no value in this run" in out
+    assert "nan" not in out.lower()
 
 
 def test_status_and_notes_of_a_verdict(hil: Command) -> None:
