@@ -46,7 +46,7 @@ def test_a_damaged_log_is_read_or_refused(tmp_path: Path, name: str, data: bytes
     """400 damaged logs each: no exception but BadInput in one line, no warning, no time twice."""
     rng, path = Random(11), tmp_path / name
     mapping = LogMapping.model_validate(tomllib.loads(MAP))
-    read = 0
+    read, refused = 0, []
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for _ in range(400):
@@ -54,9 +54,11 @@ def test_a_damaged_log_is_read_or_refused(tmp_path: Path, name: str, data: bytes
             try:
                 signals = (read_csv if name == "log.csv" else read_tlog)(path, mapping)
             except BadInput as refusal:
-                assert "\n" not in str(refusal)
+                refused.append(str(refusal))
                 continue
             read += 1
             assert (np.diff(signals.t_s) > 0.0).all()
             assert np.isfinite(signals.columns["est_theta_rad"]).all()
-    assert 40 < read < 400
+    assert read > 10
+    assert len(refused) > 10
+    assert not any("\n" in line for line in refused)
