@@ -218,7 +218,7 @@ def _pairs(
     points: Path | None,
 ) -> PointPairs:
     """Return the world-image pairs by whichever method was asked for."""
-    from vision.calibration.boards import parse_board
+    from vision.calibration.boards import not_seen_hint, parse_board
     from vision.calibration.points import (
         PointPairs,
         pairs_of_board,
@@ -242,7 +242,8 @@ def _pairs(
     for k, (name, image) in enumerate(images):
         view = known.find(image, name)
         if view is None:
-            raise BadInput(f"{name}: board {board_text} not seen; is it whole, flat and in focus?")
+            hint = not_seen_hint(known, image) or "; is it whole, flat and in focus?"
+            raise BadInput(f"{name}: board {board_text} not seen{hint}")
         if view.fault:
             raise BadInput(
                 f"{name}: another board than {board_text}: {view.fault}; count its squares, not its"

@@ -12,7 +12,7 @@ BOARD = "charuco:8x6:30:22"
 board_option = click.option(
     "--board", "board_text", default=BOARD, show_default=True, metavar="BOARD",
     help="charuco:COLUMNSxROWS:SQUARE_MM:MARKER_MM or chess:COLUMNSxROWS:SQUARE_MM, in squares; "
-    "sizes as measured on the print.",
+    "sizes as measured on the print. charuco-old: printed before OpenCV 4.6.",
 )  # fmt: skip
 
 

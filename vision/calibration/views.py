@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hil.core.errors import BadInput
 from vision import cv_compat
-from vision.calibration.boards import Board, BoardView
+from vision.calibration.boards import Board, BoardView, not_seen_hint
 from vision.calibration.intrinsics import advise, coverage, distance_px, slant_deg
 from vision.sources import ImageFolder, LiveCamera, VideoFile
 
@@ -42,6 +42,12 @@ class Views:
     faults: list[str] = field(default_factory=list)
     looked: int = 0
     where: str = ""
+    hint: str = ""
+
+    def look_for_other(self, board: Board, image: Image) -> None:
+        """Keep what is seen in place of the board, as long as nothing else was."""
+        if not self.views and not self.hint:
+            self.hint = not_seen_hint(board, image)
 
     def sound(self, view: BoardView | None) -> BoardView | None:
         """Return the view of the next image if it shows the board described, and count it."""
@@ -62,7 +68,8 @@ class Views:
                 f" {most}); count its squares, not its corners, and give them as --board"
             )
         if not self.views:
-            raise BadInput(f"board not seen in any of {self.where}; is it the board described?")
+            hint = self.hint or "; is it the board described?"
+            raise BadInput(f"board not seen in any of {self.where}{hint}")
         raise BadInput(
             f"lens: {len(self.views)} usable views of the board in {self.where}, at least {count} are"
             " needed; add views from other sides and tilts, or is it another board than described?"
@@ -77,6 +84,8 @@ def views_of_folder(board: Board, folder: Path, report: Report) -> Views:
         name = source.files[frame.index].name
         assert frame.image is not None
         seen = board.find(frame.image, name)
+        if seen is None:
+            found.look_for_other(board, frame.image)
         view = found.sound(seen)
         if view is not None:
             report(f"{name}: {len(view.px)} corners")
@@ -103,7 +112,10 @@ def views_of_video(board: Board, path: Path, report: Report) -> Views:
         next_look_s = frame.t_cam_s + 1.0 / LOOKS_PER_S
         assert frame.image is not None
         name = f"frame {frame.index} at {frame.t_cam_s:.2f} s"
-        view = picker.offer(found.sound(board.find(frame.image, name)))
+        seen = board.find(frame.image, name)
+        if seen is None:
+            found.look_for_other(board, frame.image)
+        view = picker.offer(found.sound(seen))
         if view is not None:
             found.views.append(view)
             report(f"{name}: view {len(found.views)}, {len(view.px)} corners")
