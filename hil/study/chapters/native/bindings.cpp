@@ -78,7 +78,7 @@ void bind_outcome(nb::module_& m) {
         auto* data = new std::vector<double>(out.samples);
         nb::capsule owner(data, [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
         return nb::ndarray<nb::numpy, double, nb::ndim<1>>(data->data(), {data->size()}, owner);
-      });
+      }, nb::rv_policy::automatic);
 }
 
 void bind_quadrotor(nb::module_& m) {
