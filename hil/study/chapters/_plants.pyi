@@ -34,6 +34,7 @@ class Outcome:
     peak_late: float
     peak: float
     tilt_late: float
+    integral_cost: float
     rate_rms: float
     s_max: list[float]
     end_s: float

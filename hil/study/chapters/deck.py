@@ -68,7 +68,9 @@ class Row(Section):
     stage: str | None = None
     sign: float = 1.0
     choices: tuple[str, ...] = ()
+    nearby_starts: int = Field(1, ge=1, le=64, description="starts 1e-12 m apart, for chaotic rows")
     limit_m: float | None = Field(None, gt=0)
+    limit_integral_m_s: float | None = Field(None, gt=0)
     control_of: str | None = None
 
 
@@ -93,15 +95,19 @@ class Measure(Section):
 
 
 class Claim(Section):
-    """One sentence of the source, and the range in which our value counts as reproducing it."""
+    """One sentence of the source, and the range in which our value counts as reproducing it.
 
+    With `undecidable` a value outside the range decides nothing: the text says what is missing.
+    """
+
+    chapter: str
     claim: str
     where: str
     printed: str
-    measure: Measure
-    reproduced: tuple[float, float]
+    measure: Measure | None = None
+    reproduced: tuple[float, float] = (0.0, 0.0)
     note: str = ""
-    undecidable: str = ""
+    undecidable: str = Field("", description="what is not printed, where the claim hangs on it")
 
 
 class Belief(Section):
@@ -156,10 +162,9 @@ class StudyDeck(Section):
         for figure in self.figures:
             found += [(f"figure {figure.number}", name) for name in figure.rows]
         for claim in self.claims:
-            measure = claim.measure
-            found += [
-                (f"claim {claim.claim!r}", name) for name in (measure.row, measure.over) if name
-            ]
+            if claim.measure:
+                names = (claim.measure.row, claim.measure.over)
+                found += [(f"claim {claim.claim!r}", name) for name in names if name]
         return found
 
     @property

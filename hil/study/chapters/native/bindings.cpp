@@ -67,6 +67,7 @@ void bind_outcome(nb::module_& m) {
       .def_ro("peak_late", &Outcome::peak_late)
       .def_ro("peak", &Outcome::peak)
       .def_ro("tilt_late", &Outcome::tilt_late)
+      .def_ro("integral_cost", &Outcome::integral_cost)
       .def_ro("rate_rms", &Outcome::rate_rms)
       .def_ro("s_max", &Outcome::s_max)
       .def_ro("end_s", &Outcome::end_s)
@@ -115,10 +116,10 @@ void bind_vehicle5(nb::module_& m) {
       VEHICLE5_PARAMETERS(X)
 #undef X
       .def("rates", [](const Vehicle5& p, double t, const Vehicle5::State& x, const Vec3& torque) {
-        return p.rates(t, x, torque, {});
+        return p.rates(p.gust(t), x, torque, {});
       }, "t_s"_a, "state"_a, "torque"_a)
       .def("step", [](const Vehicle5& p, double t, const Vehicle5::State& x, const Vec3& torque, double h) {
-        return rk4([&](double at, const Vehicle5::State& y) { return p.rates(at, y, torque, {}); }, t, x, h);
+        return rk4([&](double at, const Vehicle5::State& y) { return p.rates(p.gust(at), y, torque, {}); }, t, x, h);
       }, "t_s"_a, "state"_a, "torque"_a, "dt_s"_a)
       .def("energy", &Vehicle5::energy, "state"_a)
       .def("reference", &Vehicle5::reference, "t_s"_a);

@@ -23,6 +23,7 @@ struct Outcome {
   double peak_early = 0.0, peak_late = 0.0;  // largest |u|^2 before and after the study's early_s
   double peak = 0.0;                       // largest |u_i|
   double tilt_late = 0.0;                  // largest pitch after the settling time, rad
+  double integral_cost = 0.0;              // sum |integral of e_i| at the end, where a law has it
   double rate_rms = 0.0;                   // error of the estimated rate after the settling time
   Vec3 s_max{};                            // largest ||s|| of each stage
   double end_s = 0.0;

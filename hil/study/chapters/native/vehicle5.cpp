@@ -23,9 +23,15 @@ struct Rotation {  // body to world, roll 0
 
 }  // namespace
 
-Vehicle5::State Vehicle5::rates(double t, const State& x, const Vec3& torque, const Vec3& volt) const {
-  const double theta = x[3], u = x[5], v = x[6], w = x[7], q = x[8], r = x[9];
+Vehicle5::Gust Vehicle5::gust(double t) const {
   const double f = disturbance_rate_ratio * t, kin = velocity_disturbance_m_s, acc = accel_disturbance_m_s2;
+  return {{kin * std::sin(0.7 * f), kin * std::cos(0.5 * f), kin * std::sin(0.9 * f)},
+          {acc * std::sin(1.1 * f), acc * std::cos(0.8 * f), acc * std::sin(0.6 * f)},
+          {acc * std::cos(0.9 * f), acc * std::sin(1.3 * f)}};
+}
+
+Vehicle5::State Vehicle5::rates(const Gust& gust, const State& x, const Vec3& torque, const Vec3& volt) const {
+  const double theta = x[3], u = x[5], v = x[6], w = x[7], q = x[8], r = x[9];
   const Vec3 moved = Rotation(theta, x[4]).to_world({u, v, w});
   const bool driven = motor > 0.5;
   Vec3 push = torque;
@@ -33,17 +39,17 @@ Vehicle5::State Vehicle5::rates(double t, const State& x, const Vec3& torque, co
     for (int i = 0; i < 3; ++i) push[i] = motor_gain_n_a * x[10 + i];
   }
   State out{};
-  out[0] = moved[0] + kin * std::sin(0.7 * f);
-  out[1] = moved[1] + kin * std::cos(0.5 * f);
-  out[2] = moved[2] + kin * std::sin(0.9 * f);
+  out[0] = moved[0] + gust.moved[0];
+  out[1] = moved[1] + gust.moved[1];
+  out[2] = moved[2] + gust.moved[2];
   out[3] = q;
   out[4] = r / std::cos(theta);
-  out[5] = (m22_kg * v * r - m33_kg * w * q - d11_kg_s * u + push[0]) / m11_kg + acc * std::sin(1.1 * f);
-  out[6] = (-m11_kg * u * r - d22_kg_s * v) / m22_kg + acc * std::cos(0.8 * f);
-  out[7] = (m11_kg * u * q - d33_kg_s * w) / m33_kg + acc * std::sin(0.6 * f);
+  out[5] = (m22_kg * v * r - m33_kg * w * q - d11_kg_s * u + push[0]) / m11_kg + gust.pushed[0];
+  out[6] = (-m11_kg * u * r - d22_kg_s * v) / m22_kg + gust.pushed[1];
+  out[7] = (m11_kg * u * q - d33_kg_s * w) / m33_kg + gust.pushed[2];
   out[8] = ((m33_kg - m11_kg) * u * w - d55_kg_m2_s * q - righting_n_m() * std::sin(theta) + push[1]) / m55_kg_m2 +
-           acc * std::cos(0.9 * f);
-  out[9] = ((m11_kg - m22_kg) * u * v - d66_kg_m2_s * r + push[2]) / m66_kg_m2 + acc * std::sin(1.3 * f);
+           gust.turned[0];
+  out[9] = ((m11_kg - m22_kg) * u * v - d66_kg_m2_s * r + push[2]) / m66_kg_m2 + gust.turned[1];
   if (driven) {
     const Vec3 speed{u, q, r};
     for (int i = 0; i < 3; ++i) {
@@ -92,6 +98,7 @@ class Cascade {
     const Wanted wanted = sideways_stage(t, x, turn.to_body(velocity), turn.to_body(accel));
     return drive_stage(t, x, wanted);
   }
+  const Vec3& integral() const { return p1_; }
 
  private:
   control::SuperTwisting make_differ() const { return {plant_.differentiator_bound_m_s2, 1.5, 1.1, true}; }
@@ -210,6 +217,7 @@ Outcome dive(const Vehicle5& plant, control::Law& position, control::Law& sidewa
   x[2] = plant.start_z_m;
   x[5] = plant.start_u_m_s;
   const bool driven = plant.motor > 0.5;
+  Vehicle5::Gust now = plant.gust(0.0);
   for (int k = 0; k < ticks; ++k) {
     const double t = k * h;
     const auto ref = plant.reference(t);
@@ -220,6 +228,8 @@ Outcome dive(const Vehicle5& plant, control::Law& position, control::Law& sidewa
     for (const double part : torque) out.peak = std::max(out.peak, std::abs(part));
     out.s_max = {std::max(out.s_max[0], position.s_norm()), std::max(out.s_max[1], sideways.s_norm()),
                  std::max(out.s_max[2], drive.s_norm())};
+    out.integral_cost = 0.0;
+    for (const double part : cascade.integral()) out.integral_cost += std::abs(part);
     if (t > plant.settle_s) out.tilt_late = std::max(out.tilt_late, std::abs(x[3]));
     if (k % every == 0) {
       out.samples.insert(out.samples.end(),
@@ -227,7 +237,12 @@ Outcome dive(const Vehicle5& plant, control::Law& position, control::Law& sidewa
                           out.ise, x[5], x[6], x[7], x[8], x[9], torque[0], torque[1], torque[2]});
     }
     const Vec3 volt = driven ? voltage(plant, x, torque) : Vec3{};
-    x = rk4([&](double at, const Vehicle5::State& y) { return plant.rates(at, y, torque, volt); }, t, x, h);
+    const Vehicle5::Gust middle = plant.gust(t + 0.5 * h), last = plant.gust(t + h);
+    x = rk4([&](double at, const Vehicle5::State& y) {
+          const double done = (at - t) / h;
+          return plant.rates(done < 0.25 ? now : done < 0.75 ? middle : last, y, torque, volt);
+        }, t, x, h);
+    now = last;
     if (std::abs(x[3]) > 1.55) {  // 0.02 rad short of 90 degrees, where r/cos(theta) ends
       tally.out.end_s = t + h;
       tally.stop(End::tumbled);

@@ -28,7 +28,12 @@ struct Vehicle5 {
   using State = std::array<double, 13>;
 
   double righting_n_m() const { return mass_kg * gravity_m_s2 * metacentre_m; }
-  State rates(double t, const State& x, const Vec3& torque, const Vec3& volt) const;
+  struct Gust {
+    Vec3 moved, pushed;        // m/s on the world position, m/s^2 on u, v, w
+    std::array<double, 2> turned;  // rad/s^2 on q, r
+  };
+  Gust gust(double t) const;
+  State rates(const Gust& gust, const State& x, const Vec3& torque, const Vec3& volt) const;
   double energy(const State& x) const;
   std::array<Vec3, 3> reference(double t) const;
 };
