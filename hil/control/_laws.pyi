@@ -23,7 +23,7 @@ class Law:
     def output(self, t_s: float, p: Sequence[float], q: Sequence[float], dt_s: float) -> Vector:
         """Return w for the interval of dt_s that begins at t_s."""
     def rate(self, q_dot: Sequence[float]) -> Vector:
-        """Return dw/dt of the latest output for a known dq/dt, sgn held."""
+        """Return dw/dt of the latest output for a known dq/dt, sgn and eps held."""
     def advance(self, dt_s: float) -> None:
         """Integrate what the law keeps; leave it out while an output is limited."""
 
@@ -53,7 +53,7 @@ class AsgIsm(Law):
     def terms(
         self, t_s: float, p: Sequence[float], q: Sequence[float]
     ) -> tuple[Vector, Vector, Vector, Vector, Vector]:
-        """Return s, kappa, Psi, the sub-gradient of H, and the layer eps."""
+        """Return s, kappa, Psi, the sub-gradient of H, and the layer eps; advance goes on from here."""
     @property
     def eta(self) -> Vector:
         """eta = -p(0) - mu0 q(0) (4.24): s(0) = 0."""

@@ -51,28 +51,16 @@ class AsgIsm : public Law {
     last_ = {};
   }
 
-  AsgTerms terms(double t_s, const Vec& p, const Vec& q) const {
-    AsgTerms out;
-    const double falling = 1.0 / (t_s + gains_.mu0);
-    const bool floored = falling <= gains_.mu_min;
-    out.mu = floored ? gains_.mu_min : falling;
-    const double layer = gains_.eps0 * std::pow(falling, 1.0 + gains_.beta);
-    for (int i = 0; i < gains_.n; ++i) {
-      out.dh[i] = gains_.sigma * sign(p[i]);
-      out.psi[i] = out.mu * sum_[i];
-      const double pulled = out.mu * (p[i] + eta_[i]);
-      out.s[i] = q[i] + pulled + out.psi[i];
-      out.kappa[i] = floored ? out.mu * (q[i] + out.dh[i])
-                             : out.mu * (q[i] - pulled + out.dh[i] - out.psi[i]);
-      out.eps[i] = std::max(layer, gains_.eps_min[i]);
-    }
-    return out;
-  }
-
-  Vec output(double t_s, const Vec& p, const Vec& q, double dt_s) override {
+  // The terms of this tick, for who forms an output of them; advance goes on from here.
+  const AsgTerms& observe(double t_s, const Vec& p, const Vec& q) {
     last_ = terms(t_s, p, q);
     q_ = q;
     floored_ = 1.0 / (t_s + gains_.mu0) <= gains_.mu_min;
+    return last_;
+  }
+
+  Vec output(double t_s, const Vec& p, const Vec& q, double dt_s) override {
+    observe(t_s, p, q);
     Vec w{};
     for (int i = 0; i < gains_.n; ++i) {
       w[i] = -last_.kappa[i] - gains_.kd[i] * q[i] - reaching(i, dt_s);
@@ -105,6 +93,24 @@ class AsgIsm : public Law {
   double s_norm() const override { return norm(last_.s, gains_.n); }
 
  private:
+  AsgTerms terms(double t_s, const Vec& p, const Vec& q) const {
+    AsgTerms out;
+    const double falling = 1.0 / (t_s + gains_.mu0);
+    const bool floored = falling <= gains_.mu_min;
+    out.mu = floored ? gains_.mu_min : falling;
+    const double layer = gains_.eps0 * std::pow(falling, 1.0 + gains_.beta);
+    for (int i = 0; i < gains_.n; ++i) {
+      out.dh[i] = gains_.sigma * sign(p[i]);
+      out.psi[i] = out.mu * sum_[i];
+      const double pulled = out.mu * (p[i] + eta_[i]);
+      out.s[i] = q[i] + pulled + out.psi[i];
+      out.kappa[i] = floored ? out.mu * (q[i] + out.dh[i])
+                             : out.mu * (q[i] - pulled + out.dh[i] - out.psi[i]);
+      out.eps[i] = std::max(layer, gains_.eps_min[i]);
+    }
+    return out;
+  }
+
   double reaching(int i, double dt_s) const {
     const Layer layer{gains_.componentwise};
     if (!gains_.implicit) return gains_.k[i] * layer.unit(last_.s, gains_.n, i, last_.eps[i]);

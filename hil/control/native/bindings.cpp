@@ -82,9 +82,9 @@ void bind_asg(nb::module_& m) {
       }, nb::kw_only(), "k"_a, "eps_min"_a, "mu0_s"_a, "sigma"_a, "kd"_a = List{}, "eps0"_a = 0.0,
          "beta"_a = 0.5, "mu_min"_a = 0.0, "componentwise"_a = false, "implicit"_a = false)
       .def("cost", [](const AsgIsm& law, const List& p) { return law.cost(vec(p, law.dim())); }, "p"_a)
-      .def("terms", [](const AsgIsm& law, double t, const List& p, const List& q) {
+      .def("terms", [](AsgIsm& law, double t, const List& p, const List& q) {
         const int n = law.dim();
-        const AsgTerms now = law.terms(t, vec(p, n), vec(q, n));
+        const AsgTerms& now = law.observe(t, vec(p, n), vec(q, n));
         return nb::make_tuple(tuple(now.s, n), tuple(now.kappa, n), tuple(now.psi, n),
                               tuple(now.dh, n), tuple(now.eps, n));
       }, "t_s"_a, "p"_a, "q"_a)
