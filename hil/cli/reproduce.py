@@ -51,10 +51,11 @@ def command(
 
     Exit status 1: a row misses its limit, or a negative control holds.
     """  # noqa: D301 - \b is click's mark for a verbatim paragraph
-    from hil.record.manifest import command_line, replace_file
+    from hil.record.manifest import command_line
     from hil.runs.execute import new_folder
+    from hil.study.chapters.document import markdown
     from hil.study.chapters.laws import OwnLaw
-    from hil.study.chapters.report import markdown, refuse_used, write_all
+    from hil.study.chapters.report import refuse_used, write_all, write_markdown
     from hil.study.chapters.reproduction import check_request, reproduce, to_json
 
     check_request(chapter, law_file)
@@ -65,7 +66,7 @@ def command(
         sections = reproduce(chapter, begin, own=own, overrides=overrides, sweeps=not quick)
     report = write_all(folder, sections, command_line())
     if markdown_file is not None:
-        replace_file(markdown_file, markdown(sections).encode())
+        write_markdown(markdown_file, markdown(sections))
     document = to_json(sections, command_line(), report)
     if as_json:
         print_json(document)

@@ -31,7 +31,8 @@ class AsgIsm(Law):
     """Averaged sub-gradient integral sliding mode (4.12)-(4.16), (4.20), (4.24).
 
     `mu_min` and `implicit` are extensions, off by default: mu stops falling at mu_min; the sliding
-    term is the projection of s on the ball of radius k dt_s, which needs no layer.
+    term is the projection of s on the ball of radius k dt_s, which needs no layer. `dominating` is
+    the gain law (4.14) as printed: no -kappa in w, k + 2 (||kappa|| + |d eps/dt|) outweighs it.
     """
 
     def __init__(
@@ -47,6 +48,7 @@ class AsgIsm(Law):
         mu_min: float = ...,
         componentwise: bool = ...,
         implicit: bool = ...,
+        dominating: bool = ...,
     ) -> None: ...
     def cost(self, p: Sequence[float]) -> float:
         """Return H(p) = sigma sum |p_i| (4.10)."""
@@ -56,7 +58,7 @@ class AsgIsm(Law):
         """Return s, kappa, Psi, the sub-gradient of H, and the layer eps; advance goes on from here."""
     @property
     def eta(self) -> Vector:
-        """eta = -p(0) - mu0 q(0) (4.24): s(0) = 0."""
+        """Eta = -p(0) - mu0 q(0) (4.24): s(0) = 0."""
     @property
     def averaged(self) -> Vector:
         """Integral of the sub-gradient."""

@@ -6,6 +6,9 @@
 //   w     = -kappa - kd q - k s/(||s|| + eps(t))
 //   eps   = max(eps0 mu^(1 + beta), eps_min)
 //
+// With `dominating` the gain law (4.14) as printed: no -kappa in w, the gain outweighs it instead,
+// k(t) = k + 2 (||kappa|| + |d eps/dt|).
+//
 // Two extensions, both off by default: mu stops falling at mu_min (d mu/dt = 0 from there), and the
 // sliding term in implicit form, -P(s)/h with P the projection on the ball of radius k h.
 #pragma once
@@ -24,7 +27,7 @@ struct AsgGains {
   double eps0 = 0.0, beta = 0.5;
   double mu0 = 1.0, mu_min = 0.0;
   double sigma = 1.0;  // scale of the cost H = sigma sum |p_i|
-  bool componentwise = false, implicit = false;
+  bool componentwise = false, implicit = false, dominating = false;
 };
 
 struct AsgTerms {
@@ -63,7 +66,8 @@ class AsgIsm : public Law {
     observe(t_s, p, q);
     Vec w{};
     for (int i = 0; i < gains_.n; ++i) {
-      w[i] = -last_.kappa[i] - gains_.kd[i] * q[i] - reaching(i, dt_s);
+      const double kappa = gains_.dominating ? 0.0 : last_.kappa[i];
+      w[i] = -kappa - gains_.kd[i] * q[i] - reaching(i, dt_s);
     }
     return w;
   }
@@ -77,11 +81,12 @@ class AsgIsm : public Law {
     for (int i = 0; i < gains_.n; ++i) {
       // kappa = mu (q + dh - Psi) - mu pulled, each with its own rate; d mu/dt = -mu^2 or 0
       const double pulled = now.s[i] - q_[i] - now.psi[i];
-      const double kappa_dot = floored_ ? mu * q_dot[i]
-                                        : mu * q_dot[i] - 2.0 * mu * mu *
-                                              (q_[i] - pulled + now.dh[i] - now.psi[i]);
+      const double kappa_dot = gains_.dominating ? 0.0
+                               : floored_        ? mu * q_dot[i]
+                                                 : mu * q_dot[i] - 2.0 * mu * mu *
+                                                       (q_[i] - pulled + now.dh[i] - now.psi[i]);
       w_dot[i] = -kappa_dot - gains_.kd[i] * q_dot[i] -
-                 gains_.k[i] * layer.unit_rate(now.s, s_dot, gains_.n, i, now.eps[i]);
+                 gain(i) * layer.unit_rate(now.s, s_dot, gains_.n, i, now.eps[i]);
     }
     return w_dot;
   }
@@ -111,11 +116,19 @@ class AsgIsm : public Law {
     return out;
   }
 
+  double gain(int i) const {
+    if (!gains_.dominating) return gains_.k[i];
+    const double mu = last_.mu, layer = gains_.eps0 * std::pow(mu, 1.0 + gains_.beta);
+    const double eps_dot = layer > gains_.eps_min[i] ? (1.0 + gains_.beta) * layer * mu : 0.0;
+    return gains_.k[i] + 2.0 * (norm(last_.kappa, gains_.n) + eps_dot);
+  }
+
   double reaching(int i, double dt_s) const {
     const Layer layer{gains_.componentwise};
-    if (!gains_.implicit) return gains_.k[i] * layer.unit(last_.s, gains_.n, i, last_.eps[i]);
+    const double k = gain(i);
+    if (!gains_.implicit) return k * layer.unit(last_.s, gains_.n, i, last_.eps[i]);
     const double length = layer.size(last_.s, gains_.n, i);
-    return length <= gains_.k[i] * dt_s ? last_.s[i] / dt_s : gains_.k[i] * last_.s[i] / length;
+    return length <= k * dt_s ? last_.s[i] / dt_s : k * last_.s[i] / length;
   }
 
   AsgGains gains_;

@@ -11,7 +11,8 @@ from hil.config.load import load_scenario
 from hil.runs.execute import RunSpec, execute_in_memory
 from hil.study import ideal_circle
 from hil.study.chapters.deck import Belief, Claim, Measure
-from hil.study.chapters.runs import FIGURES, Progress, RowResult
+from hil.study.chapters.quantities import FIGURES
+from hil.study.chapters.runs import Progress, RowResult
 
 LAWS = ("pid", "asg-ism")
 _LAST_S = 10.0
@@ -44,10 +45,11 @@ CLAIMS = (
 )
 BELIEF = Belief(
     chapter="8",
-    text="""On the linearised model with ideal sensing the sliding mode has <<circle asg-ism ise_m2_s>> m² s on the \
-circle of (8.23) and state feedback <<circle pid ise_m2_s>> m² s, under the same disturbance and with the signs of A and B \
-repaired; with the printed signs both leave the circle. On the twin, with camera, delays and restrictions, both laws end \
-within a few millimetres of the point, and which is nearer is decided by gains (docs/statistics.md).""",
+    text="""On the linearised model with ideal sensing the sliding mode has <<circle asg-ism ise_m2_s>>
+    m² s on the circle of (8.23) and state feedback <<circle pid ise_m2_s>> m² s, under the same
+    disturbance and with the signs of A and B repaired; with the printed signs both leave the circle.
+    On the twin, with camera, delays and restrictions, both laws end within a few millimetres of the
+    point, and which is nearer is decided by gains (docs/statistics.md).""",
 )
 
 

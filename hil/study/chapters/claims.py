@@ -28,7 +28,7 @@ class ClaimResult:
         if self.claim.measure and self.value is not None and low <= self.value <= high:
             return "reproduced"
         if self.claim.undecidable:
-            return f"not decidable: not printed or not legible is {self.claim.undecidable}"
+            return f"not decidable because {self.claim.undecidable}"
         return "not reproduced"
 
     def to_json(self) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from hil.config.base import Section
 from hil.config.load import build, read_tree
 from hil.core.errors import BadInput
+from hil.study.chapters.quantities import COLUMNS, FIGURES, PARAMETERS
 
 STUDIES = ("quadrotor", "underwater-5dof", "underwater-6dof")
 Positive = Annotated[float, Field(gt=0)]
@@ -44,6 +45,7 @@ class LawSpec(Section):
     sigma: float | None = Field(None, ge=0)
     componentwise: bool | None = None
     implicit: bool | None = None
+    dominating: bool | None = None
 
 
 class LawSet(Section):
@@ -136,6 +138,18 @@ class StudyDeck(Section):
 
     @model_validator(mode="after")
     def _names_exist(self) -> StudyDeck:
+        missing = sorted(set(PARAMETERS[self.plant]) - set(self.parameters))
+        if missing:
+            raise ValueError(f"parameter {missing[0]} of the plant is missing; give a value")
+        for name in self.parameters:
+            _known(name, PARAMETERS[self.plant], "parameter")
+        for figure in self.figures:
+            for name in " over ".join(figure.panels).split(" over "):
+                _known(name, COLUMNS[self.plant], f"figure {figure.number}: column")
+        for claim in self.claims:
+            _known(
+                claim.measure.figure if claim.measure else "ise_m2_s", FIGURES, "figure of a row"
+            )
         for row in self.rows:
             _known(row.law, self.laws, f"row {row.row}: law")
             for key in row.set:

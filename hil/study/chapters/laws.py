@@ -50,7 +50,7 @@ def _make(
 ) -> control.Law:
     gains = spec.model_dump(exclude_none=True, exclude={"kind"})
     for key, value in changed.items():
-        if key in gains or key in {"mu_min", "implicit", "kd"}:
+        if key in gains or key in {"mu_min", "implicit", "dominating", "kd"}:
             gains[key] = [value] * axes if key in _WHOLE | {"kd", "eps", "eps_min"} else value
     for key in _WHOLE & gains.keys():
         values = list(gains[key])

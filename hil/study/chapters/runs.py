@@ -14,6 +14,7 @@ import numpy as np
 from hil.study.chapters import _plants
 from hil.study.chapters.deck import Row, StudyDeck, spread
 from hil.study.chapters.laws import OwnLaw, make_laws
+from hil.study.chapters.quantities import COLUMNS, FIGURES, check_values
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,27 +26,6 @@ _PLANTS: Mapping[str, Callable[[], Any]] = {
     "quadrotor": _plants.Quadrotor,
     "vehicle5": _plants.Vehicle5,
     "vehicle6": _plants.Vehicle6,
-}
-COLUMNS: Mapping[str, tuple[str, ...]] = {
-    "quadrotor": _plants.QUADROTOR_COLUMNS,
-    "vehicle5": _plants.VEHICLE5_COLUMNS,
-    "vehicle6": _plants.VEHICLE6_COLUMNS,
-}
-# figure of a row -> attribute of an outcome, unit
-FIGURES: Mapping[str, tuple[str, str]] = {
-    "ise_m2_s": ("ise", "m² s"),
-    "ise_late_m2_s": ("ise_late", "m² s"),
-    "worst_m": ("worst_late", "m"),
-    "worst_end_m": ("worst_end", "m"),
-    "cost_m": ("cost_late", "m"),
-    "effort": ("effort", "u² s"),
-    "effort_early": ("effort_early", "u² s"),
-    "peak_early": ("peak_early", "u²"),
-    "peak_late": ("peak_late", "u²"),
-    "peak": ("peak", "u"),
-    "tilt_rad": ("tilt_late", "rad"),
-    "integral_cost_m_s": ("integral_cost", "m s"),
-    "rate_error_m_s": ("rate_rms", "m/s"),
 }
 _LATE = {"worst_m", "cost_m", "ise_late_m2_s", "tilt_rad", "rate_error_m_s"}
 _MEANS = {"ise_m2_s", "ise_late_m2_s", "effort", "effort_early"}
@@ -118,18 +98,21 @@ def job(deck: StudyDeck, row: Row, name: str, choice: str | None) -> Job:
     """Return one job: parameters of the study, then those of the choice, then the row's own."""
     values = {key: parameter.value for key, parameter in deck.parameters.items()}
     values |= deck.choices[choice] if choice else {}
-    return Job(deck, row, name, values | row.set)
+    values |= row.set
+    check_values(values, f"row {name}")
+    return Job(deck, row, name, values)
 
 
 def draws(plant: str, values: Mapping[str, float], seed: int) -> list[float]:
     """Return the random numbers of one run: disturbances (quadrotor), measurement noise."""
-    rng = np.random.RandomState(seed)  # noqa: NPY002 - its stream is fixed for ever
+    rng = np.random.RandomState(seed)  # whose stream is fixed for ever
+    numbers = np.empty(0)
     if plant == "quadrotor":
         count = math.ceil(values["duration_s"] / values["hold_s"]) + 1
-        return (2.0 * rng.random_sample(count * 6) - 1.0).tolist()
-    if plant == "vehicle6" and values["noise_m"] > 0.0:
-        return rng.standard_normal(int(values["duration_s"] / values["step_s"]) * 3).tolist()
-    return []
+        numbers = 2.0 * rng.random_sample(count * 6) - 1.0
+    elif plant == "vehicle6" and values["noise_m"] > 0.0:
+        numbers = rng.standard_normal(int(values["duration_s"] / values["step_s"]) * 3)
+    return [float(number) for number in numbers]
 
 
 def simulate(work: Job, seed: int, own: OwnLaw | None = None) -> Any:
@@ -143,10 +126,12 @@ def simulate(work: Job, seed: int, own: OwnLaw | None = None) -> Any:
     random = draws(deck.plant, work.values, seed)
     try:
         if deck.plant == "quadrotor":
-            return _plants.fly(plant, *laws, random)
+            position, attitude = laws
+            return _plants.fly(plant, position, attitude, random)
         if deck.plant == "vehicle5":
-            return _plants.dive(plant, *laws)
-        return _plants.swim(plant, *laws, random)
+            position, sideways, drive = laws
+            return _plants.dive(plant, position, sideways, drive)
+        return _plants.swim(plant, laws[0], random)
     except Exception as error:
         if own is None or not use_own:
             raise

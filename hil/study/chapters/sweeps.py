@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hil.study.chapters.deck import StudyDeck
+from hil.study.chapters.quantities import check_values
 from hil.study.chapters.runs import Job, Progress, RowResult, jobs_of, run_jobs
 
 START_DISTANCES_M = (0.0, 0.1, 0.3, 1.0, 2.0)
@@ -57,6 +58,7 @@ def changes(deck: StudyDeck, rows: Sequence[str] | None = None) -> list[tuple[st
                     else value
                 )
                 job = Job(deck, work.row, work.name, {**work.values, name: tried})
+                check_values(job.values, f"row {work.name}: sweep of {name}")
                 found.append((name, value, job))
     return found
 
