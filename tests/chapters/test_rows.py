@@ -83,6 +83,13 @@ def test_gains_in_the_spirit_of_the_text_beat_p_at_equal_torque(chapter5):
     assert ism["effort"] < 1.1 * p["effort"]
 
 
+def test_signs_and_masses_as_printed_lose_the_vehicle(chapter5, chapter6):
+    """Mixed signs of stage 1 end 80 m away; G without the added mass has 8 times the error."""
+    assert chapter5.row("U5s")["worst_m"] == pytest.approx(79.8, rel=0.01)
+    ratio = chapter6.row("O8 fins off")["worst_m"] / chapter6.row("O5 fins off")["worst_m"]
+    assert ratio == pytest.approx(7.7, rel=0.02)
+
+
 def test_noise_and_the_kept_control_in_kind(chapter6):
     """1 mm of noise doubles the error; (6.27) as printed chatters at the limit and is chaotic."""
     assert chapter6.row("O10 fins off")["ise_m2_s"] == pytest.approx(2.0, rel=0.15)

@@ -18,7 +18,7 @@ def block(n, *, k=1.0, eps=0.05, mu0=1.0, sigma=1.0, **more):
     return AsgIsm(k=[k] * n, eps_min=[eps], mu0_s=mu0, sigma=sigma, **more)
 
 
-def closed(law, p, q, disturbance, *, h=1e-3, duration=20.0):
+def closed(law, p, q, disturbance, *, h=1e-3, duration=8.0):
     """Run dp/dt = q, dq/dt = w + d with the law; return t, p and ||s|| (all from the tick)."""
     p, q = np.array(p, float), np.array(q, float)
     law.reset(p, q)
@@ -58,7 +58,7 @@ def test_kappa_is_what_the_average_adds_to_the_rate_of_s(mu_min):
 
     h, before, checked = 1e-4, None, 0
     law.reset(*motion(0.0))
-    for k in range(20_000):
+    for k in range(15_000):
         t = k * h
         p, q = motion(t)
         s, kappa, *_ = law.terms(t, p, q)
@@ -70,7 +70,7 @@ def test_kappa_is_what_the_average_adds_to_the_rate_of_s(mu_min):
             assert rate == pytest.approx(q_dot + kappa, abs=2e-3)
             checked += 1
         before = np.array(s)
-    assert checked > 300
+    assert checked > 250
 
 
 def test_gain_above_the_disturbance_keeps_the_layer():
@@ -99,7 +99,7 @@ def test_lemma_the_energy_of_the_average_is_constant_on_the_surface():
         return (t + mu0) * law.cost(p) + 0.5 * np.sum((np.array(law.averaged) + eta) ** 2)
 
     start = energy(0.0)
-    for k in range(int(20.0 / h)):
+    for k in range(int(10.0 / h)):
         t = k * h
         q = -(p + eta + np.array(law.averaged)) / (t + mu0)  # s = 0
         s, *_ = law.terms(t, p, q)
@@ -107,17 +107,17 @@ def test_lemma_the_energy_of_the_average_is_constant_on_the_surface():
         assert (t + mu0) * law.cost(p) <= start * 1.005
         law.advance(h)
         p = p - h * (p + eta + np.array(law.averaged)) / (t + mu0)  # with the new average: no drift
-    assert energy(20.0) == pytest.approx(start, rel=5e-3)
+    assert energy(10.0) == pytest.approx(start, rel=5e-3)
 
 
 def test_on_the_surface_the_error_swings_with_a_falling_amplitude():
     """|p| <= E/(sigma (t + mu0)) in each axis, and comes near it: the bound is no wider than need be."""
     t, p, _ = closed(
-        block(1, k=4.0, eps=0.002, sigma=1.0), [-2.0], [0.3], lambda _t: 0.0, duration=30.0
+        block(1, k=4.0, eps=0.002, sigma=1.0), [-2.0], [0.3], lambda _t: 0.0, duration=16.0
     )
     limit = np.array([bounds.amplitude(x, -2.0, 0.3, sigma=1.0, mu0_s=1.0) for x in t])
     assert np.all(np.abs(p[:, 0]) <= limit * 1.01)
-    late = t > 20.0
+    late = t > 8.0
     assert np.abs(p[late, 0]).max() > 0.9 * limit[late].min()
 
 
@@ -161,15 +161,15 @@ def test_printed_layer_grows_and_loses_the_error():
         law = block(1, k=1.5, eps=0.01, sigma=0.1)
         p, q, late = np.zeros(1), np.array([0.5]), 0.0
         law.reset(p, q)
-        h = 2e-3
-        for k in range(int(100.0 / h)):
+        h = 4e-3
+        for k in range(int(60.0 / h)):
             t = k * h
             (s,), (kappa,), *_ = law.terms(t, p, q)
             eps = max(0.1 * (t + 1.0) ** (beta_sign * 1.5), 0.01)
             law.advance(h)
             p = p + h * q
             q = q + h * (-kappa - 1.5 * s / (abs(s) + eps) + 0.3 * math.sin(0.5 * t) + 0.2)
-            late = max(late, abs(q[0])) if t > 50.0 else late
+            late = max(late, abs(q[0])) if t > 30.0 else late
         return late
 
     assert worst(-1.0) < 0.02
@@ -226,9 +226,9 @@ def test_floored_mu_forgets_at_a_constant_rate():
     def late(mu_min):
         law = block(1, k=2.0, eps=0.1, mu_min=mu_min)
         t, p, _ = closed(
-            law, [0.0], [0.0], lambda x: 0.8 * math.sin(0.5 * x), duration=150.0, h=5e-3
+            law, [0.0], [0.0], lambda x: 0.8 * math.sin(0.5 * x), duration=100.0, h=1e-2
         )
-        return np.abs(p[t > 100.0]).max()
+        return np.abs(p[t > 70.0]).max()
 
     assert late(0.2) < 0.5 * late(0.0)
 
@@ -241,3 +241,22 @@ def test_wrong_lengths_are_refused():
         block(7)
     with pytest.raises(ValueError, match="2 entries is needed, not 1"):
         block(2).output(0.0, [0.0], [0.0, 0.0], 1e-3)
+
+
+def test_the_derivative_form_is_an_algebraic_loop():
+    """(5.10) with phi := u(s), s holding phi itself: below the step's gain it switches every step."""
+
+    def variation(eps):
+        x, u, total, speed, h = 0.5, 0.0, 0.0, 0.3, 1e-3
+        averaged, steps = 0.0, 5000
+        for k in range(steps):
+            mu = 1.0 / (k * h + 1.0)
+            s = (u - speed) + mu * (x - 0.5) + mu * averaged
+            new = -s / (abs(s) + eps)
+            total += abs(new - u)
+            u, averaged = new, averaged + h * np.sign(x)
+            x += h * (u - speed)
+        return total / steps
+
+    assert variation(0.1) > 0.5
+    assert variation(2.0) < 0.01

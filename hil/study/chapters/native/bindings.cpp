@@ -159,6 +159,7 @@ void bind_vehicle6(nb::module_& m) {
 }  // namespace
 
 NB_MODULE(_plants, m) {
+  nb::set_leak_warnings(false);  // values held by a test session at exit are no leak
   nb::module_::import_("hil.control._laws");  // its types are used here
   bind_outcome(m);
   bind_quadrotor(m);
