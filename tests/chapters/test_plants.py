@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -51,10 +52,9 @@ def state(kind):
 def steps(kind, made, x, h, duration):
     x = list(x)
     for k in range(round(duration / h)):
-        if kind == "quadrotor":
-            x = made.step(x, 0.0, [0.0] * 3, h)
-        else:
-            x = made.step(k * h, x, [0.0] * 3, h)
+        when = () if kind == "quadrotor" else (k * h,)
+        thrust = (0.0,) if kind == "quadrotor" else ()
+        x = made.step(*when, x, *thrust, [0.0] * 3, h)
     return x
 
 
@@ -83,7 +83,7 @@ def test_damping_only_takes_energy(kind):
     for k in range(300):
         x = made.step(0.01 * k, x, [0.0] * 3, 0.01)
         energies.append(made.energy(x))
-    assert all(b <= a + 1e-12 for a, b in zip(energies, energies[1:], strict=False))
+    assert all(b <= a + 1e-12 for a, b in itertools.pairwise(energies))
     assert energies[-1] < 0.95 * energies[0]
 
 

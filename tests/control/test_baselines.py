@@ -25,7 +25,7 @@ def run(law, p, q, disturbance, *, duration=6.0, h=2e-3):
 
 
 def test_pd_has_the_poles_of_its_gains():
-    """kp = kd^2/4: p(t) = (p0 + (q0 + p0 c) t) exp(-c t), by hand."""
+    """Kp = kd^2/4: p(t) = (p0 + (q0 + p0 c) t) exp(-c t), by hand."""
     ps, _ = run(
         StateFeedback(kp=[4.0], kd=[4.0]), [1.0], [0.0], lambda _t: 0.0, h=5e-4, duration=3.0
     )

@@ -148,7 +148,7 @@ def test_layer_share_is_the_integral_it_stands_for():
 
 
 def test_gain_and_disturbance_bound_are_the_formulas():
-    """k = 2 (D + k0) with D = gamma0 + gamma1 ||rho|| + gamma2 ||phi||, by hand."""
+    """The gain is 2 (D + k0) with D = gamma0 + gamma1 ||rho|| + gamma2 ||phi||, by hand."""
     bound = bounds.disturbance_bound((0.1, 2.0, 0.5), (3.0, 4.0), (0.0, 2.0))
     assert bound == pytest.approx(0.1 + 10.0 + 1.0)
     assert bounds.gain(bound, 0.4) == pytest.approx(23.0)

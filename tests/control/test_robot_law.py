@@ -56,7 +56,7 @@ def test_block_gives_the_robot_s_terms_to_the_last_bit():
 
 
 def test_output_is_what_the_terms_say():
-    """w = -kappa - k s/(||s|| + eps) of the same terms."""
+    """The output is -kappa - k s/(||s|| + eps) of the same terms."""
     block = control.AsgIsm(k=[3.0, 3.0], eps_min=[0.1], mu0_s=1.0, sigma=0.3)
     block.reset((0.4, -0.2), (1.0, 0.5))
     s, kappa, _, _, eps = block.terms(0.5, (0.6, -0.1), (0.7, 0.9))

@@ -20,12 +20,12 @@ something that is not printed and our value is elsewhere, it is not decidable.
 STARTS = "### From where three times smaller holds"
 _STARTS_TEXT = """
 Integral of the squared error, PD (Q4) over ISM (Q6), by the distance of the start from the circle
-(2 m is the origin at rest), for amplitudes of the disturbance and horizons, first seed. Above 3 the
+(2 m is the origin at rest) and the amplitude of the disturbance, means over the seeds. Above 3 the
 claim holds, below 1 PD is the better.
 """
 SENSITIVITY = "## Sensitivity to assumed values"
 _SENSITIVITY_TEXT = """
-One value at a time, first seed. A value may be printed and still be a guess in its unit.
+One value at a time, seeds as in the rows. A value may be printed and still be a guess in its unit.
 """
 
 
@@ -78,7 +78,7 @@ def _rows(section: Section) -> list[str]:
 def _starts(section: Section) -> list[str]:
     found = section.start_map
     assert found is not None
-    heads = [f"{size:g} m/s², {duration:g} s" for size, duration in found.conditions]
+    heads = [f"{size:g} m/s²" for size in found.disturbances]
     lines = ["", STARTS, _STARTS_TEXT, f"| start | {' | '.join(heads)} |"]
     lines += [f"| --- |{' --- |' * len(heads)}"]
     for distance, ratios in zip(found.distances_m, found.ratios, strict=True):

@@ -12,14 +12,14 @@ from hil.study.chapters.runs import Job, Progress, RowResult, jobs_of, run_jobs
 
 START_DISTANCES_M = (0.0, 0.1, 0.3, 1.0, 2.0)
 """From the circle inwards along x, at the same share of its speed: 2 m is the origin at rest."""
-CONDITIONS = ((0.25, 70.0), (0.5, 70.0), (1.0, 70.0), (0.5, 200.0))
-"""Amplitude of the disturbance and horizon in s."""
+DISTURBANCES = (0.25, 0.5, 1.0)
+"""Amplitudes of the disturbance in m/s^2 and rad/s^2."""
 _PAIR = ("Q4 circle", "Q6 circle")
 
 
 @dataclass(frozen=True, slots=True)
 class Sensitivity:
-    """One row with one assumed value changed, beside the row as it stands (same seed)."""
+    """One row with one assumed value changed, beside the row as it stands (same seeds)."""
 
     parameter: str
     unit: str
@@ -64,14 +64,18 @@ def changes(deck: StudyDeck, rows: Sequence[str] | None = None) -> list[tuple[st
 
 
 def sensitivity(deck: StudyDeck, progress: Progress | None = None) -> list[Sensitivity]:
-    """Run every change with the first seed."""
-    one = deck.model_copy(update={"seeds": deck.seeds[:1]})
-    base = {row.name: row for row in run_jobs(jobs_of(one, one.sensitivity_rows))}
-    tried = changes(one)
+    """Run every change with the seeds of the study."""
+    base = {row.name: row for row in run_jobs(jobs_of(deck, deck.sensitivity_rows))}
+    tried = changes(deck)
     results = run_jobs([job for _, _, job in tried], progress=progress)
     return [
         Sensitivity(
-            name, one.parameters[name].unit, one.parameters[name].value, value, base[row.name], row
+            name,
+            deck.parameters[name].unit,
+            deck.parameters[name].value,
+            value,
+            base[row.name],
+            row,
         )
         for (name, value, _), row in zip(tried, results, strict=True)
     ]
@@ -79,10 +83,10 @@ def sensitivity(deck: StudyDeck, progress: Progress | None = None) -> list[Sensi
 
 @dataclass(frozen=True, slots=True)
 class StartMap:
-    """Integral of the squared error of PD over that of ISM, a row a distance, a column a condition."""
+    """Integral of the squared error of PD over that of ISM: a row a distance, a column a disturbance."""
 
     distances_m: tuple[float, ...]
-    conditions: tuple[tuple[float, float], ...]
+    disturbances: tuple[float, ...]
     ratios: tuple[tuple[float | None, ...], ...]
 
     def to_json(self) -> dict[str, Any]:
@@ -90,31 +94,27 @@ class StartMap:
         return {
             "ratio": "integral of |error|^2, Q4 (PD) over Q6 (ISM)",
             "start_distance_m": list(self.distances_m),
-            "conditions": [
-                {"disturbance_m_s2": size, "duration_s": duration}
-                for size, duration in self.conditions
-            ],
+            "disturbance_m_s2": list(self.disturbances),
             "ratios": [list(row) for row in self.ratios],
         }
 
 
 def start_map(deck: StudyDeck, progress: Progress | None = None) -> StartMap:
-    """Return the map for the quadrotor (first seed)."""
-    one = deck.model_copy(update={"seeds": deck.seeds[:1]})
-    pair = jobs_of(one, _PAIR)
-    radius, rate = (one.parameters[name].value for name in ("radius_m", "rate_rad_s"))
+    """Return the map for the quadrotor, from means over the seeds."""
+    pair = jobs_of(deck, _PAIR)
+    radius, rate = (deck.parameters[name].value for name in ("radius_m", "rate_rad_s"))
     jobs = []
     for distance in START_DISTANCES_M:
         share = 1.0 - distance / radius
-        for size, duration in CONDITIONS:
+        for size in DISTURBANCES:
             start = {"start_x_m": radius * share, "start_vy_m_s": radius * rate * share}
-            case = {**start, "disturbance": size, "duration_s": duration}
-            jobs += [Job(one, work.row, work.name, {**work.values, **case}) for work in pair]
+            case = {**start, "disturbance": size}
+            jobs += [Job(deck, work.row, work.name, {**work.values, **case}) for work in pair]
     rows = iter(run_jobs(jobs, progress=progress))
     ratios = tuple(
-        tuple(_ratio(next(rows), next(rows)) for _ in CONDITIONS) for _ in START_DISTANCES_M
+        tuple(_ratio(next(rows), next(rows)) for _ in DISTURBANCES) for _ in START_DISTANCES_M
     )
-    return StartMap(START_DISTANCES_M, CONDITIONS, ratios)
+    return StartMap(START_DISTANCES_M, DISTURBANCES, ratios)
 
 
 def _ratio(pd: RowResult, ism: RowResult) -> float | None:
