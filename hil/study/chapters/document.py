@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from hil.study.chapters.claims import shown
 from hil.study.chapters.reproduction import Section
+from hil.study.chapters.sweeps import StartMap
 
 _HEAD = """\
 # Reproduction of the numerical studies
@@ -83,7 +84,21 @@ def _starts(section: Section) -> list[str]:
     lines += [f"| --- |{' --- |' * len(heads)}"]
     for distance, ratios in zip(found.distances_m, found.ratios, strict=True):
         lines.append(f"| {distance:g} m | {' | '.join(shown(ratio) for ratio in ratios)} |")
-    return lines
+    return [*lines, "", " ".join(_reach(found, column) for column in range(len(heads)))]
+
+
+def _reach(found: StartMap, column: int) -> str:
+    """Return up to which of the tried distances the claim holds under one disturbance."""
+    holds = 0
+    for ratios in found.ratios:
+        ratio = ratios[column]
+        if ratio is None or ratio < 3.0:
+            break
+        holds += 1
+    size = found.disturbances[column]
+    if holds == 0:
+        return f"With {size:g} m/s² it holds from none of these starts."
+    return f"With {size:g} m/s² it holds up to {found.distances_m[holds - 1]:g} m from the circle."
 
 
 def _sensitivities(sections: Sequence[Section]) -> list[str]:

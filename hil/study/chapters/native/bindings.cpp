@@ -142,9 +142,11 @@ void bind_vehicle6(nb::module_& m) {
 #undef X
       .def("coriolis", &Vehicle6::coriolis, "speed"_a)
       .def("damping", &Vehicle6::damping, "speed"_a)
-      .def("rates", &Vehicle6::rates, "t_s"_a, "state"_a, "force_n"_a)
+      .def("rates", [](const Vehicle6& p, double t, const Vehicle6::State& x, const Vec3& force) {
+        return p.rates(p.gust(p.waves(0.0, t)), x, force);
+      }, "t_s"_a, "state"_a, "force_n"_a)
       .def("step", [](const Vehicle6& p, double t, const Vehicle6::State& x, const Vec3& force, double h) {
-        return rk4([&](double at, const Vehicle6::State& y) { return p.rates(at, y, force); }, t, x, h);
+        return rk4([&](double at, const Vehicle6::State& y) { return p.rates(p.gust(p.waves(0.0, at)), y, force); }, t, x, h);
       }, "t_s"_a, "state"_a, "force_n"_a, "dt_s"_a)
       .def("energy", &Vehicle6::energy, "state"_a)
       .def("reference", &Vehicle6::reference, "t_s"_a);

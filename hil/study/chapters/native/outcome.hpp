@@ -73,6 +73,28 @@ class Tally {
   Clock clock_;
 };
 
+// Sines and cosines of N rates, advanced by a fixed dt: a rotation each instead of two functions
+// (1e-10 off after a million steps).
+template <std::size_t N>
+struct Waves {
+  std::array<double, N> s{}, c{}, by_s{}, by_c{};
+  Waves(const std::array<double, N>& rates, double dt, double t = 0.0) {
+    for (std::size_t i = 0; i < N; ++i) {
+      s[i] = std::sin(rates[i] * t);
+      c[i] = std::cos(rates[i] * t);
+      by_s[i] = std::sin(rates[i] * dt);
+      by_c[i] = std::cos(rates[i] * dt);
+    }
+  }
+  void advance() {
+    for (std::size_t i = 0; i < N; ++i) {
+      const double next = s[i] * by_c[i] + c[i] * by_s[i];
+      c[i] = c[i] * by_c[i] - s[i] * by_s[i];
+      s[i] = next;
+    }
+  }
+};
+
 template <std::size_t N, class Rates>
 std::array<double, N> rk4(const Rates& rates, double t, const std::array<double, N>& x, double h) {
   const auto moved = [&x](const std::array<double, N>& k, double step) {

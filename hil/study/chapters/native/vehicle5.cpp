@@ -23,16 +23,23 @@ struct Rotation {  // body to world, roll 0
 
 }  // namespace
 
-Vehicle5::Gust Vehicle5::gust(double t) const {
-  const double f = disturbance_rate_ratio * t, kin = velocity_disturbance_m_s, acc = accel_disturbance_m_s2;
-  return {{kin * std::sin(0.7 * f), kin * std::cos(0.5 * f), kin * std::sin(0.9 * f)},
-          {acc * std::sin(1.1 * f), acc * std::cos(0.8 * f), acc * std::sin(0.6 * f)},
-          {acc * std::cos(0.9 * f), acc * std::sin(1.3 * f)}};
+Waves<8> Vehicle5::waves(double dt, double t) const {
+  std::array<double, 8> rates{0.7, 0.5, 0.9, 1.1, 0.8, 0.6, 0.9, 1.3};
+  for (double& rate : rates) rate *= disturbance_rate_ratio;
+  return Waves<8>(rates, dt, t);
+}
+
+Vehicle5::Gust Vehicle5::gust(const Waves<8>& at) const {
+  const double kin = velocity_disturbance_m_s, acc = accel_disturbance_m_s2;
+  return {{kin * at.s[0], kin * at.c[1], kin * at.s[2]},
+          {acc * at.s[3], acc * at.c[4], acc * at.s[5]},
+          {acc * at.c[6], acc * at.s[7]}};
 }
 
 Vehicle5::State Vehicle5::rates(const Gust& gust, const State& x, const Vec3& torque, const Vec3& volt) const {
   const double theta = x[3], u = x[5], v = x[6], w = x[7], q = x[8], r = x[9];
-  const Vec3 moved = Rotation(theta, x[4]).to_world({u, v, w});
+  const Rotation turn(theta, x[4]);
+  const Vec3 moved = turn.to_world({u, v, w});
   const bool driven = motor > 0.5;
   Vec3 push = torque;
   if (driven) {
@@ -43,11 +50,11 @@ Vehicle5::State Vehicle5::rates(const Gust& gust, const State& x, const Vec3& to
   out[1] = moved[1] + gust.moved[1];
   out[2] = moved[2] + gust.moved[2];
   out[3] = q;
-  out[4] = r / std::cos(theta);
+  out[4] = r / turn.ct;
   out[5] = (m22_kg * v * r - m33_kg * w * q - d11_kg_s * u + push[0]) / m11_kg + gust.pushed[0];
   out[6] = (-m11_kg * u * r - d22_kg_s * v) / m22_kg + gust.pushed[1];
   out[7] = (m11_kg * u * q - d33_kg_s * w) / m33_kg + gust.pushed[2];
-  out[8] = ((m33_kg - m11_kg) * u * w - d55_kg_m2_s * q - righting_n_m() * std::sin(theta) + push[1]) / m55_kg_m2 +
+  out[8] = ((m33_kg - m11_kg) * u * w - d55_kg_m2_s * q - righting_n_m() * turn.st + push[1]) / m55_kg_m2 +
            gust.turned[0];
   out[9] = ((m11_kg - m22_kg) * u * v - d66_kg_m2_s * r + push[2]) / m66_kg_m2 + gust.turned[1];
   if (driven) {
@@ -217,7 +224,8 @@ Outcome dive(const Vehicle5& plant, control::Law& position, control::Law& sidewa
   x[2] = plant.start_z_m;
   x[5] = plant.start_u_m_s;
   const bool driven = plant.motor > 0.5;
-  Vehicle5::Gust now = plant.gust(0.0);
+  Waves<8> waves = plant.waves(0.5 * h);
+  Vehicle5::Gust now = plant.gust(waves);
   for (int k = 0; k < ticks; ++k) {
     const double t = k * h;
     const auto ref = plant.reference(t);
@@ -237,7 +245,10 @@ Outcome dive(const Vehicle5& plant, control::Law& position, control::Law& sidewa
                           out.ise, x[5], x[6], x[7], x[8], x[9], torque[0], torque[1], torque[2]});
     }
     const Vec3 volt = driven ? voltage(plant, x, torque) : Vec3{};
-    const Vehicle5::Gust middle = plant.gust(t + 0.5 * h), last = plant.gust(t + h);
+    waves.advance();
+    const Vehicle5::Gust middle = plant.gust(waves);
+    waves.advance();
+    const Vehicle5::Gust last = plant.gust(waves);
     x = rk4([&](double at, const Vehicle5::State& y) {
           const double done = (at - t) / h;
           return plant.rates(done < 0.25 ? now : done < 0.75 ? middle : last, y, torque, volt);

@@ -32,7 +32,9 @@ struct Vehicle5 {
     Vec3 moved, pushed;        // m/s on the world position, m/s^2 on u, v, w
     std::array<double, 2> turned;  // rad/s^2 on q, r
   };
-  Gust gust(double t) const;
+  Waves<8> waves(double dt, double t = 0.0) const;
+  Gust gust(const Waves<8>& waves) const;
+  Gust gust(double t) const { return gust(waves(0.0, t)); }
   State rates(const Gust& gust, const State& x, const Vec3& torque, const Vec3& volt) const;
   double energy(const State& x) const;
   std::array<Vec3, 3> reference(double t) const;

@@ -54,7 +54,18 @@ Vehicle6::Six Vehicle6::damping(const Six& s) const {
           (n_v + n_vv * n[1]) * s[1] + (n_r + n_rr * n[5]) * s[5]};
 }
 
-Vehicle6::State Vehicle6::rates(double t, const State& x, const Vec3& force) const {
+Waves<3> Vehicle6::waves(double dt, double t) const {
+  std::array<double, 3> rates{0.6, 0.9, 1.3};
+  for (double& rate : rates) rate *= disturbance_rate_ratio;
+  return Waves<3>(rates, dt, t);
+}
+
+Vec3 Vehicle6::gust(const Waves<3>& at) const {
+  const double a = disturbance_m_s2;
+  return {a * at.s[0], a * at.c[1], a * at.s[2]};
+}
+
+Vehicle6::State Vehicle6::rates(const Vec3& gust, const State& x, const Vec3& force) const {
   const auto R = rotation(x);
   const Six s{x[7], x[8], x[9], x[10], x[11], x[12]}, m = inertia(), drag = damping(s);
   const auto C = coriolis(s);
@@ -64,8 +75,7 @@ Vehicle6::State Vehicle6::rates(double t, const State& x, const Vec3& force) con
   const Vec3 down = to_body(R, {0.0, 0.0, 1.0});
   push[3] -= metacentre_m * weight_n * down[1];
   push[4] += metacentre_m * weight_n * down[0];
-  const double f = disturbance_rate_ratio * t, a = disturbance_m_s2;
-  const Vec3 xi = to_body(R, {a * std::sin(0.6 * f), a * std::cos(0.9 * f), a * std::sin(1.3 * f)});
+  const Vec3 xi = to_body(R, gust);
   State out{};
   const Vec3 moved = to_world(R, {s[0], s[1], s[2]});
   for (int i = 0; i < 3; ++i) out[i] = moved[i];
@@ -110,6 +120,8 @@ Outcome swim(const Vehicle6& plant, control::Law& position, const std::vector<do
   x[3] = 1.0;
   x[7] = plant.start_u_m_s;
   const Vehicle6::Six inertia = plant.inertia();
+  Waves<3> waves = plant.waves(0.5 * h);
+  Vec3 now = plant.gust(waves);
   Vec3 before{};
   double miss2 = 0.0, last_s = 0.0;
   for (int k = 0; k < ticks; ++k) {
@@ -156,7 +168,15 @@ Outcome swim(const Vehicle6& plant, control::Law& position, const std::vector<do
                          {t, x[0], x[1], x[2], ref[0][0], ref[0][1], ref[0][2], std::sqrt(dot(e, e)), out.ise,
                           std::abs(e[0]) + std::abs(e[1]) + std::abs(e[2]), dot(u, u), position.s_norm()});
     }
-    x = rk4([&](double at, const Vehicle6::State& y) { return plant.rates(at, y, force); }, t, x, h);
+    waves.advance();
+    const Vec3 middle = plant.gust(waves);
+    waves.advance();
+    const Vec3 last = plant.gust(waves);
+    x = rk4([&](double at, const Vehicle6::State& y) {
+          const double done = (at - t) / h;
+          return plant.rates(done < 0.25 ? now : done < 0.75 ? middle : last, y, force);
+        }, t, x, h);
+    now = last;
     const double length = std::sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5] + x[6] * x[6]);
     for (int i = 3; i < 7; ++i) x[i] /= length;
   }

@@ -33,7 +33,9 @@ struct Vehicle6 {
   // C(v) v with the whole C, and C itself for who wants to see that it is skew
   std::array<Six, 6> coriolis(const Six& v) const;
   Six damping(const Six& v) const;
-  State rates(double t, const State& x, const Vec3& force) const;
+  Waves<3> waves(double dt, double t = 0.0) const;
+  Vec3 gust(const Waves<3>& waves) const;  // m/s^2, world
+  State rates(const Vec3& gust, const State& x, const Vec3& force) const;
   double energy(const State& x) const;
   std::array<Vec3, 3> reference(double t) const;
 };
