@@ -25,8 +25,10 @@ Vec3 solve(const std::array<Vec3, 3>& a, const Vec3& b) {
 }  // namespace
 
 Quadrotor::Matrices Quadrotor::matrices(const Vec3& angle, const Vec3& rate) const {
-  const double s = std::sin(angle[1]), c = std::cos(angle[1]);
-  const double S = std::sin(angle[2]), K = std::cos(angle[2]);
+  return matrices(std::sin(angle[1]), std::cos(angle[1]), std::sin(angle[2]), std::cos(angle[2]), rate);
+}
+
+Quadrotor::Matrices Quadrotor::matrices(double s, double c, double S, double K, const Vec3& rate) const {
   const double a = ixx_kg_m2, b = iyy_kg_m2, d = izz_kg_m2;
   const double psi = rate[0], theta = rate[1], phi = rate[2];
   Matrices m;
@@ -55,10 +57,10 @@ Quadrotor::State Quadrotor::rates(const State& x, const Input& wanted,
                                   const std::array<double, 6>& xi) const {
   const double cps = std::cos(x[6]), sps = std::sin(x[6]), cth = std::cos(x[7]), sth = std::sin(x[7]);
   const double cph = std::cos(x[8]), sph = std::sin(x[8]);
-  const Vec3 angle{x[6], x[7], x[8]}, rate{x[9], x[10], x[11]};
+  const Vec3 rate{x[9], x[10], x[11]};
   const bool ideal = motor_lag_s <= 0.0;
   const double lift = (ideal ? wanted.thrust : x[12]) / mass_kg, drag = drag_n_s2_m2 / mass_kg;
-  const Matrices m = matrices(angle, rate);
+  const Matrices m = matrices(sth, cth, sph, cph, rate);
   const Vec3 turn = times(m.coriolis, rate);
   Vec3 torque;
   for (int i = 0; i < 3; ++i) torque[i] = (ideal ? wanted.torque[i] : x[13 + i]) - turn[i];

@@ -32,6 +32,8 @@ struct Quadrotor {
   };
 
   Matrices matrices(const Vec3& angle, const Vec3& rate) const;
+  // the same for sine and cosine of pitch (s, c) and roll (S, K)
+  Matrices matrices(double s, double c, double S, double K, const Vec3& rate) const;
   State rates(const State& x, const Input& wanted, const std::array<double, 6>& xi) const;
   double energy(const State& x) const;
   // position, velocity and acceleration of the reference
