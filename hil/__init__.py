@@ -26,6 +26,16 @@ _NAMES = {
     "Scenario": ("hil.config.scenario", "Scenario"),
     "OuterLimits": ("hil.config.control", "OuterLimits"),
     "ReferenceConfig": ("hil.config.control", "ReferenceConfig"),
+    "Comparison": ("hil.api", "Comparison"),
+    "Experiment": ("hil.api", "Experiment"),
+    "Run": ("hil.api", "Run"),
+    "compare": ("hil.api", "compare"),
+    "experiment": ("hil.api", "experiment"),
+    "load_scenario": ("hil.api", "load_scenario"),
+    "make_env": ("hil.api", "make_env"),
+    "open_record": ("hil.api", "open_record"),
+    "replay": ("hil.api", "replay"),
+    "run": ("hil.api", "run"),
 }
 # decorator -> registry of hil.core.registries
 _DECORATORS = {
@@ -37,8 +47,10 @@ _DECORATORS = {
 
 __all__ = [
     "BadInput",
+    "Comparison",
     "Estimate",
     "Estimator",
+    "Experiment",
     "OuterCommand",
     "OuterLaw",
     "OuterLimits",
@@ -47,17 +59,35 @@ __all__ = [
     "ReferenceConfig",
     "ReferenceState",
     "RigFault",
+    "Run",
     "Scenario",
     "Section",
     "WheelSample",
     "__version__",
+    "compare",
     "estimator",
+    "experiment",
+    "load_scenario",
     "localiser",
+    "make_env",
+    "open_record",
     "outer_law",
     "reference",
+    "replay",
+    "run",
 ]
 
 if TYPE_CHECKING:
+    from hil.api import Comparison as Comparison
+    from hil.api import Experiment as Experiment
+    from hil.api import Run as Run
+    from hil.api import compare as compare
+    from hil.api import experiment as experiment
+    from hil.api import load_scenario as load_scenario
+    from hil.api import make_env as make_env
+    from hil.api import open_record as open_record
+    from hil.api import replay as replay
+    from hil.api import run as run
     from hil.config.base import Section as Section
     from hil.config.control import OuterLimits as OuterLimits
     from hil.config.control import ReferenceConfig as ReferenceConfig
