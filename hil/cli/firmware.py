@@ -22,8 +22,9 @@ def command() -> None:
 
 @command.command()
 @click.option(
-    "--out", type=click.Path(path_type=Path), metavar="DIR", help="[default: build/firmware of the checkout; the user's cache where the project is installed]"
-)
+    "--out", type=click.Path(path_type=Path), metavar="DIR",
+    help="[default: build/firmware of the checkout, the user's cache without one]",
+)  # fmt: skip
 @click.option("--fresh", is_flag=True, help="Compile even when nothing has changed.")
 def build(out: Path | None, fresh: bool) -> int:
     """Compile the sketch to ELF and HEX and print its size."""

@@ -7,7 +7,7 @@ is behind them. Host time is the rig's; `t_s` counts from the first tick of the 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -121,7 +121,7 @@ class Session:
             pass
         return self.ending
 
-    def steps(self) -> Iterator[Situation]:
+    def steps(self) -> Generator[Situation]:
         """Run all phases, pausing at each tick before the law is asked; then `ending` says how it was.
 
         Time of a simulated rig stands still in a pause. Closing the iterator stops the robot.
@@ -192,7 +192,7 @@ class Session:
             raise RigFault(f"board: acknowledged arming and stayed {link.state_name}")
         self._note("armed", link.state_name)
 
-    def _control(self) -> Iterator[Situation]:
+    def _control(self) -> Generator[Situation]:
         scenario, rig, law = self._scenario, self._parts.rig, self._parts.law
         period_s = 1.0 / scenario.control.rate_hz
         ticks = round(scenario.duration_s * scenario.control.rate_hz) + 1

@@ -7,9 +7,8 @@ in its place. So the same seed and the same commands give the same rows as a run
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hil.core.rig import Rig
-    from hil.core.types import Estimate, OuterLaw, ReferenceState
+    from hil.core.types import Estimate, ReferenceState
     from hil.record.reader import RunRecord
     from hil.runs.session import Parts, Situation
 
@@ -105,7 +104,7 @@ class HilEnv(gymnasium.Env["Vector", "Vector"]):
     After the end, and in the middle, `record()` is the run so far, as `hil.run` would have it.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium declares it
 
     def __init__(self, spec: RunSpec) -> None:
         """Take the run to step; raises BadInput for a target that is not simulated."""
@@ -183,7 +182,7 @@ class _Episode:
         self._rig: Rig = open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
         self._parts: Parts = make_parts(spec, self._rig, self._recorder, self._law)
         self.session = Session(spec.scenario, self._parts, parameters, board_hashes)
-        self._steps: Iterator[Situation] = self.session.steps()
+        self._steps = self.session.steps()
         self.record: RunRecord | None = None
         self._spent = 0.0
         self._situation = next(self._steps, None)
@@ -220,7 +219,7 @@ class _Episode:
         """Stop the robot where it still moves, keep the record, release the rig."""
         if self.record is not None:
             return
-        self._steps.close()  # type: ignore[attr-defined] - the session's generator
+        self._steps.close()
         self._rig.close()
         self.record = self.as_record(self.session.ending)
         if self.session.ending == Ending("interrupted", "Ctrl-C"):
@@ -253,7 +252,6 @@ class _Episode:
         return run_cost(self.record.figures().values if complete else {}) - self._spent
 
 
-
 def _error_m(row: Any) -> float:
     """Return |delta1| of a row, from the truth where there is one."""
     prefix = "true_delta1" if math.isfinite(row[_ROW["true_delta1_x_m"]]) else "delta1"
@@ -277,8 +275,6 @@ def observation(situation: Situation) -> Vector:
         *reference.z1_dddot_m_s3,
     )
     return np.clip(np.array(values, dtype=np.float64), -_BOUNDS, _BOUNDS)
-
-
 
 
 __all__ = ["OBSERVATION", "OUTER", "HilEnv", "Quantity"]
