@@ -99,7 +99,7 @@ class Registry:
             origin, source = self._loading
             module = str(getattr(thing, "__module__", ""))
             if origin == BUILT_IN and module.partition(".")[0] not in _OWN_PACKAGES:
-                origin = f"module {module}"  # decorated in a notebook or script, not in a file given
+                origin = f"module {module}"  # decorated in a notebook or a script
             first_line = (thing.__doc__ or "").strip().split("\n")[0]
             self._enter(
                 Entry(
