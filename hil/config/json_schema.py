@@ -58,8 +58,8 @@ def schema_of(
         if name not in listed:
             definition.pop("required", None)
     tree.pop("required", None)
-    whole = {"$schema": DIALECT, "title": title} | _tidy(tree)
-    return whole | ({"$defs": _tidy(definitions)} if definitions else {})
+    whole: Tree = {"$schema": DIALECT, "title": title} | _tidy(tree)
+    return whole | {"$defs": _tidy(definitions)} if definitions else whole
 
 
 def _whole(model: type[BaseModel]) -> Tree:
