@@ -111,6 +111,7 @@ def experiment(
     from hil.report.html import write_report  # noqa: PLC0415 - loads the figures
     from hil.runs.execute import execute, new_folder  # noqa: PLC0415 - loads the rigs
     from hil.study import experiment as many  # noqa: PLC0415
+    from hil.study import side_by_side  # noqa: PLC0415
 
     if repeats < 1 or (workers is not None and workers < 1):
         raise BadInput(f"experiment: repeats = {repeats}, workers = {workers}: at least 1 each")
@@ -121,16 +122,17 @@ def experiment(
     )
     folder = Path(out) if out is not None else new_folder("experiment")
     specs = many.deck_specs(chosen, conditions, folder)
-    todo = many.claim(folder, specs)
-    if workers == 1:
-        for spec in todo:
-            execute(spec)
-    else:
-        many.run_all(todo, lambda _name, _t_s: None, workers)
+    with many.writing(folder):
+        todo = many.claim(folder, specs, lambda _text: None)
+        if workers == 1:
+            for spec in todo:
+                execute(spec)
+        else:
+            side_by_side.run_all(todo, lambda _name, _t_s: None, workers)
     records = [read_run(spec.out) for spec in specs]
     studies = many.study_by_scenario(records)
     write_report(
-        folder / "report.html",
+        folder / many.REPORT,
         [item.comparison for item in studies],
         command=conditions.command,
         circle=many.circle_study() if circle else None,

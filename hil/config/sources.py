@@ -17,7 +17,7 @@ from hil.config.scenario import Scenario
 
 _LINE = re.compile(r'^"?(?P<key>[\w.]+)"?\s*=\s*(?P<value>[^#]*?)\s*(?:#\s*(?P<note>.*))?$')
 _TABLE = re.compile(r"^\[(?P<table>[\w.]+)\]")
-_UNIT_FIRST = re.compile(r"^[^;:,]{1,12}; ")
+_UNIT_FIRST = re.compile(r"^(?!not printed)[^;:,]{1,12}; ")
 
 
 def built_in_settings(scenario: str = "scenario-1") -> Iterator[Setting]:

@@ -18,7 +18,7 @@ from hil import __version__
 from hil.core.errors import BadInput
 
 ROOT = Path(__file__).resolve().parents[2]
-LAW = '''
+LAW = """
 import hil
 
 
@@ -32,7 +32,7 @@ class Own:
 
     def step(self, reference, estimate, dt_s):
         return hil.OuterCommand(0.2, 0.0, {})
-'''
+"""
 
 
 @dataclass(frozen=True, slots=True)
