@@ -14,10 +14,12 @@ __version__ = "0.1.0"
 _NAMES = {
     "Estimate": ("hil.core.types", "Estimate"),
     "Estimator": ("hil.core.types", "Estimator"),
+    "Localiser": ("vision.tracker", "Localiser"),
     "OuterCommand": ("hil.core.types", "OuterCommand"),
     "OuterLaw": ("hil.core.types", "OuterLaw"),
     "Pose": ("hil.core.types", "Pose"),
     "PoseMeasurement": ("hil.core.types", "PoseMeasurement"),
+    "Reference": ("hil.control.references", "Reference"),
     "ReferenceState": ("hil.core.types", "ReferenceState"),
     "WheelSample": ("hil.core.types", "WheelSample"),
     "BadInput": ("hil.core.errors", "BadInput"),
@@ -51,11 +53,13 @@ __all__ = [
     "Estimate",
     "Estimator",
     "Experiment",
+    "Localiser",
     "OuterCommand",
     "OuterLaw",
     "OuterLimits",
     "Pose",
     "PoseMeasurement",
+    "Reference",
     "ReferenceConfig",
     "ReferenceState",
     "RigFault",
@@ -92,6 +96,7 @@ if TYPE_CHECKING:
     from hil.config.control import OuterLimits as OuterLimits
     from hil.config.control import ReferenceConfig as ReferenceConfig
     from hil.config.scenario import Scenario as Scenario
+    from hil.control.references import Reference as Reference
     from hil.core.errors import BadInput as BadInput
     from hil.core.errors import RigFault as RigFault
     from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES
@@ -103,6 +108,7 @@ if TYPE_CHECKING:
     from hil.core.types import PoseMeasurement as PoseMeasurement
     from hil.core.types import ReferenceState as ReferenceState
     from hil.core.types import WheelSample as WheelSample
+    from vision.tracker import Localiser as Localiser
 
     outer_law = OUTER_LAWS.register
     estimator = ESTIMATORS.register

@@ -73,7 +73,8 @@ def run(
 
     `outer` is the scenario's own law unless another one is named; `on` and `camera` are the target and
     camera as `--on` and `--camera` name them. The record goes to `out`, which must not exist or be empty
-    (a new folder in runs/ without it), or nowhere with `in_memory`. Raises BadInput before anything moves.
+    (a new folder in runs/ without it), or nowhere with `in_memory`. Raises BadInput before anything moves,
+    KeyboardInterrupt after Ctrl-C, when the robot stands and the record is closed.
     """
     from hil.runs.execute import execute, execute_in_memory, new_folder  # noqa: PLC0415 - loads the rigs
 
@@ -81,9 +82,9 @@ def run(
     if in_memory:
         if out is not None or record_camera:
             raise BadInput("run: in_memory keeps no files; leave out and record_camera away")
-        return Run(execute_in_memory(spec))
+        return _unless_interrupted(execute_in_memory(spec))
     folder = Path(out) if out is not None else new_folder(f"{spec.scenario.name}-{spec.outer}")
-    return Run(execute(replace(spec, out=folder, record_camera=record_camera)))
+    return _unless_interrupted(execute(replace(spec, out=folder, record_camera=record_camera)))
 
 
 def experiment(
@@ -126,7 +127,7 @@ def experiment(
         todo = many.claim(folder, specs, lambda _text: None)
         if workers == 1:
             for spec in todo:
-                execute(spec)
+                _unless_interrupted(execute(spec))
         else:
             side_by_side.run_all(todo, lambda _name, _t_s: None, workers)
     records = [read_run(spec.out) for spec in specs]
@@ -264,6 +265,12 @@ def _toml(key: str, value: Any) -> str:
             f"{key} = {value!r}: a number, text, true or false, or a list of them is needed"
         )
     return json.dumps(value)  # of these, the text is the same in TOML
+
+
+def _unless_interrupted(record: RunRecord) -> Run:
+    if record.manifest.outcome == "interrupted":
+        raise KeyboardInterrupt
+    return Run(record)
 
 
 def _run(item: Run | RunRecord | AnyPath) -> Run:

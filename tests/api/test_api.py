@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -218,3 +219,32 @@ def test_wrong_input_is_one_line_and_leaves_nothing(
         call()
     assert "\n" not in str(told.value)
     assert list(tmp_path.iterdir()) == []
+
+
+@hil.outer_law("interrupts")
+class Interrupts:
+    """Presses Ctrl-C at its tenth step."""
+
+    def __init__(self, gains: object, limits: object, d0_m: float) -> None:
+        self.args = (gains, limits, d0_m)
+        self.steps = 0
+
+    def reset(self, reference: hil.ReferenceState, estimate: hil.Estimate) -> None:
+        """Keep nothing."""
+
+    def step(self, *_given: object) -> hil.OuterCommand:
+        """Return rest."""
+        self.steps += 1
+        if self.steps == 10:
+            signal.raise_signal(signal.SIGINT)
+        return hil.OuterCommand(0.0, 0.0, {})
+
+
+def test_ctrl_c_ends_a_loop_over_runs_and_closes_the_record(tmp_path: Path) -> None:
+    """The robot is stopped, the record whole, and whoever runs many is told to stop too."""
+    with pytest.raises(KeyboardInterrupt):
+        hil.run("scenario-1", Interrupts, out=tmp_path / "run", **POSE)
+    run = hil.open_record(tmp_path / "run")
+    assert (run.outcome, run.detail, run.problems) == ("interrupted", "Ctrl-C", ())
+    assert 10 <= run.samples["t_s"].size <= 11
+    assert [event.kind for event in run.events][-2:] == ["stopped", "interrupted"]
