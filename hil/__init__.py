@@ -14,10 +14,12 @@ __version__ = "0.1.0"
 _NAMES = {
     "Estimate": ("hil.core.types", "Estimate"),
     "Estimator": ("hil.core.types", "Estimator"),
+    "Localiser": ("vision.tracker", "Localiser"),
     "OuterCommand": ("hil.core.types", "OuterCommand"),
     "OuterLaw": ("hil.core.types", "OuterLaw"),
     "Pose": ("hil.core.types", "Pose"),
     "PoseMeasurement": ("hil.core.types", "PoseMeasurement"),
+    "Reference": ("hil.control.references", "Reference"),
     "ReferenceState": ("hil.core.types", "ReferenceState"),
     "WheelSample": ("hil.core.types", "WheelSample"),
     "BadInput": ("hil.core.errors", "BadInput"),
@@ -26,6 +28,16 @@ _NAMES = {
     "Scenario": ("hil.config.scenario", "Scenario"),
     "OuterLimits": ("hil.config.control", "OuterLimits"),
     "ReferenceConfig": ("hil.config.control", "ReferenceConfig"),
+    "Comparison": ("hil.api", "Comparison"),
+    "Experiment": ("hil.api", "Experiment"),
+    "Run": ("hil.api", "Run"),
+    "compare": ("hil.api", "compare"),
+    "experiment": ("hil.api", "experiment"),
+    "load_scenario": ("hil.api", "load_scenario"),
+    "make_env": ("hil.api", "make_env"),
+    "open_record": ("hil.api", "open_record"),
+    "replay": ("hil.api", "replay"),
+    "run": ("hil.api", "run"),
 }
 # decorator -> registry of hil.core.registries
 _DECORATORS = {
@@ -37,31 +49,54 @@ _DECORATORS = {
 
 __all__ = [
     "BadInput",
+    "Comparison",
     "Estimate",
     "Estimator",
+    "Experiment",
+    "Localiser",
     "OuterCommand",
     "OuterLaw",
     "OuterLimits",
     "Pose",
     "PoseMeasurement",
+    "Reference",
     "ReferenceConfig",
     "ReferenceState",
     "RigFault",
+    "Run",
     "Scenario",
     "Section",
     "WheelSample",
     "__version__",
+    "compare",
     "estimator",
+    "experiment",
+    "load_scenario",
     "localiser",
+    "make_env",
+    "open_record",
     "outer_law",
     "reference",
+    "replay",
+    "run",
 ]
 
 if TYPE_CHECKING:
+    from hil.api import Comparison as Comparison
+    from hil.api import Experiment as Experiment
+    from hil.api import Run as Run
+    from hil.api import compare as compare
+    from hil.api import experiment as experiment
+    from hil.api import load_scenario as load_scenario
+    from hil.api import make_env as make_env
+    from hil.api import open_record as open_record
+    from hil.api import replay as replay
+    from hil.api import run as run
     from hil.config.base import Section as Section
     from hil.config.control import OuterLimits as OuterLimits
     from hil.config.control import ReferenceConfig as ReferenceConfig
     from hil.config.scenario import Scenario as Scenario
+    from hil.control.references import Reference as Reference
     from hil.core.errors import BadInput as BadInput
     from hil.core.errors import RigFault as RigFault
     from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES
@@ -73,6 +108,7 @@ if TYPE_CHECKING:
     from hil.core.types import PoseMeasurement as PoseMeasurement
     from hil.core.types import ReferenceState as ReferenceState
     from hil.core.types import WheelSample as WheelSample
+    from vision.tracker import Localiser as Localiser
 
     outer_law = OUTER_LAWS.register
     estimator = ESTIMATORS.register

@@ -87,17 +87,32 @@ def find_toolchain() -> Toolchain:
 
 
 def sketch_folder() -> Path:
-    """Return the folder of the sketch, which is part of the source tree and not of a wheel."""
-    folder = Path(__file__).resolve().parents[2] / SKETCH
-    if not (folder / f"{SKETCH}.ino").is_file():
-        raise BadInput(f"{folder}: no sketch there; run from a checkout of the project's sources")
-    return folder
+    """Return the folder of the sketch: that of the checkout, or the one installed with the package.
+
+    Raises BadInput when neither is there.
+    """
+    for folder in (_checkout() / SKETCH, Path(__file__).resolve().parent / "sketch" / SKETCH):
+        if (folder / f"{SKETCH}.ino").is_file():
+            return folder
+    raise BadInput(f"{folder}: no sketch there; install the project again or use a checkout of it")
+
+
+def build_folder(sketch: Path) -> Path:
+    """Return where a build goes that nobody gave a folder: never among installed packages."""
+    if sketch.parent == _checkout():
+        return sketch.parent / "build" / "firmware"
+    cache = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    return Path(cache or Path.home() / ".cache") / "skid-steer-hil" / "firmware"
+
+
+def _checkout() -> Path:
+    return Path(__file__).resolve().parents[2]
 
 
 def build(out: Path | None = None, *, fresh: bool = False) -> Build:
     """Return the firmware built from the present sources; an up-to-date build is reused."""
     tools, sketch = find_toolchain(), sketch_folder()
-    out = out or sketch.parent / "build" / "firmware"
+    out = out or build_folder(sketch)
     build_id = _build_id(tools, sketch)
     old = None if fresh else _read_report(out)
     if old is not None and old.build_id == build_id:

@@ -19,6 +19,7 @@ from hil.core.errors import BadInput
 
 ROOT = Path(__file__).resolve().parents[2]
 XML = ROOT / "hil/wire/hil.xml"
+PROJECT = ROOT / "pyproject.toml"
 PYTHON_OUT = Path("hil/wire/dialect.py")
 C_OUT = Path("firmware_arduino/src/mavlink")
 _LEFT_OUT = ("testsuite.h",)  # mavgen's own tests: 100 KB the board never compiles
@@ -53,6 +54,22 @@ def generate() -> dict[Path, str]:
 
 def _without_date(text: str) -> list[str]:
     return [line for line in text.splitlines() if _DATE_MARK not in line]
+
+
+def project_folder(asked: Path | None) -> Path:
+    """Return the folder to generate into: the one asked for, else the checkout.
+
+    Raises BadInput outside a checkout: an installed package is not written into.
+    """
+    if asked is None and not PROJECT.is_file():
+        raise BadInput(
+            "codegen: installed, not a checkout: nothing is written among installed packages; "
+            "give a folder: --out DIR"
+        )
+    folder = ROOT if asked is None else asked
+    if folder.exists() and not folder.is_dir():
+        raise BadInput(f"{folder}: not a folder; give another --out")
+    return folder
 
 
 def differences(root: Path = ROOT) -> list[str]:

@@ -22,8 +22,9 @@ def command() -> None:
 
 @command.command()
 @click.option(
-    "--out", type=click.Path(path_type=Path), metavar="DIR", help="[default: build/firmware]"
-)
+    "--out", type=click.Path(path_type=Path), metavar="DIR",
+    help="[default: build/firmware of the checkout, the user's cache without one]",
+)  # fmt: skip
 @click.option("--fresh", is_flag=True, help="Compile even when nothing has changed.")
 def build(out: Path | None, fresh: bool) -> int:
     """Compile the sketch to ELF and HEX and print its size."""
@@ -50,17 +51,25 @@ def upload(port: str) -> None:
 
 @command.command()
 @click.option("--check", is_flag=True, help="Change nothing; status 1 when a file is stale.")
-def codegen(check: bool) -> int:
-    """Generate the MAVLink dialect for both worlds from hil/wire/hil.xml."""
+@click.option(
+    "--out", type=click.Path(path_type=Path), metavar="DIR",
+    help="Folder to generate into (or to check).  [default: the checkout]",
+)  # fmt: skip
+def codegen(check: bool, out: Path | None) -> int:
+    """Generate the MAVLink dialect for both worlds from hil/wire/hil.xml.
+
+    An installed package is not written into: there --out is needed.
+    """
     from hil.board import codegen as generator
 
+    folder = generator.project_folder(out)
     if check:
-        stale = generator.differences()
+        stale = generator.differences(folder)
         for line in stale:
             click.echo(line)
         return 1 if stale else 0
-    for path in generator.write():
-        click.echo(f"written: {visible(str(path))}")
+    for path in generator.write(folder):
+        click.echo(f"written: {visible(str(path if out is None else out / path))}")
     return 0
 
 

@@ -38,6 +38,7 @@ COMMANDS = {
     "calibrate": ("hil.cli.calibrate", "Calibrate lens, camera pose over the floor, and colours."),
     "bringup": ("hil.cli.bringup", "Check a rig with its wheels off the ground; measure it."),
     "localise": ("hil.cli.localise", "Find the robot in a video or in images, without a rig."),
+    "config": ("hil.cli.config", "Show every key of the files: unit, bounds, default, source."),
     "doctor": ("hil.cli.doctor", "Say what is installed and connected, and what is missing."),
     "bench": ("hil.cli.bench", "Measure the speed of the harness on this machine."),
 }

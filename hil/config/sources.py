@@ -17,7 +17,7 @@ from hil.config.scenario import Scenario
 
 _LINE = re.compile(r'^"?(?P<key>[\w.]+)"?\s*=\s*(?P<value>[^#]*?)\s*(?:#\s*(?P<note>.*))?$')
 _TABLE = re.compile(r"^\[(?P<table>[\w.]+)\]")
-_UNIT_FIRST = re.compile(r"^[^;:,]{1,12}; ")
+_UNIT_FIRST = re.compile(r"^(?!not printed)[^;:,]{1,12}; ")
 
 
 def built_in_settings(scenario: str = "scenario-1") -> Iterator[Setting]:
@@ -28,11 +28,17 @@ def built_in_settings(scenario: str = "scenario-1") -> Iterator[Setting]:
         node: Any = tree
         for part in setting.key.split("."):
             node = node.get(part) if isinstance(node, dict) else None
-        default = setting.default if node is None or setting.key == "mismatch" else node
+        if node is None or setting.key == "mismatch" or _of_other_kind(setting, tree):
+            node = setting.default
         source = comments.get(setting.key, setting.source)
         if not source and setting.key.startswith("control.gains.tuned."):
             source = "found by hil tune"
-        yield replace(setting, default=default, source=source)
+        yield replace(setting, default=node, source=source)
+
+
+def _of_other_kind(setting: Setting, tree: dict[str, Any]) -> bool:
+    table = tree.get(setting.key.partition(".")[0])
+    return bool(setting.kind) and isinstance(table, dict) and table.get("kind") != setting.kind
 
 
 def file_sources(scenario_name: str) -> dict[str, str]:

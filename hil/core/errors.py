@@ -1,5 +1,7 @@
 """The errors a person meets, and the exit status each one ends with."""
 
+__all__ = ["BadInput", "HilError", "RigFault"]
+
 
 class HilError(Exception):
     """Base of every error the harness raises on purpose; `exit_status` is the process's."""

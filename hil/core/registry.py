@@ -29,6 +29,7 @@ Thing = TypeVar("Thing", bound=Callable[..., Any])
 Box = Mapping[str, tuple[float, float, float]]
 
 BUILT_IN = "built in"
+_OWN_PACKAGES = ("hil", "vision", "sim_twin")
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +97,9 @@ class Registry:
 
         def enter(thing: Thing) -> Thing:
             origin, source = self._loading
+            module = str(getattr(thing, "__module__", ""))
+            if origin == BUILT_IN and module.partition(".")[0] not in _OWN_PACKAGES:
+                origin = f"module {module}"  # decorated in a notebook or a script
             first_line = (thing.__doc__ or "").strip().split("\n")[0]
             self._enter(
                 Entry(

@@ -11,6 +11,19 @@ import math
 from dataclasses import dataclass, field
 from typing import Protocol
 
+__all__ = [
+    "Estimate",
+    "Estimator",
+    "OuterCommand",
+    "OuterLaw",
+    "Pose",
+    "PoseMeasurement",
+    "ReferenceState",
+    "Vec2",
+    "WheelSample",
+    "wrap_pi",
+]
+
 Vec2 = tuple[float, float]
 
 

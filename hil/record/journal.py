@@ -73,6 +73,13 @@ def read_journal(path: Path) -> Columns:
 
 def write_parquet(path: Path, columns: Columns, schema: Sequence[Column]) -> None:
     """Write the table atomically; equal values give an equal file (no time or host inside)."""
+    part = path.with_name(f"{path.name}.part")
+    pq.write_table(arrow_table(columns, schema), part, compression="zstd", use_dictionary=False)
+    part.replace(path)
+
+
+def arrow_table(columns: Columns, schema: Sequence[Column]) -> pa.Table:
+    """Return the columns as an Arrow table; each field's metadata has unit, group and meaning."""
     fields, arrays = [], []
     for column in schema:
         values = columns.get(column.name, np.empty(0))
@@ -80,10 +87,7 @@ def write_parquet(path: Path, columns: Columns, schema: Sequence[Column]) -> Non
         notes = {"unit": column.unit, "group": column.group, "meaning": column.meaning}
         fields.append(pa.field(column.name, array.type, metadata=notes))
         arrays.append(array)
-    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields))
-    part = path.with_name(f"{path.name}.part")
-    pq.write_table(table, part, compression="zstd", use_dictionary=False)
-    part.replace(path)
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
 
 
 def _arrow_array(values: NDArray[np.float64], column: Column) -> pa.Array:

@@ -7,7 +7,7 @@ is behind them. Host time is the rig's; `t_s` counts from the first tick of the 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from hil.control.references import Reference
     from hil.core.clocks import CameraClock
     from hil.core.rig import Frame, Rig
-    from hil.core.types import Estimate, Estimator, OuterCommand, OuterLaw
+    from hil.core.types import Estimate, Estimator, OuterCommand, OuterLaw, ReferenceState
     from hil.record.memory import RunSink
     from hil.record.timeline import Timeline
     from hil.wire.link import BoardLink, WheelReport
@@ -70,8 +70,17 @@ class Ending:
     detail: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What the outer law is asked about at one tick; `t_s` counts from the first one."""
+
+    t_s: float
+    reference: ReferenceState
+    estimate: Estimate
+
+
 class Session:
-    """Runs the scenario once; `run` may be called once."""
+    """Runs the scenario once; `run` or `steps` may be called, once."""
 
     def __init__(
         self,
@@ -88,6 +97,7 @@ class Session:
         self._hashes = hashes
         self._progress = progress
         self._publish = publish
+        self.ending = Ending("fault", "ended without a cause")
         self._t0_s = 0.0
         self._dialect_hash = self._parameter_hash = 0
         self._may_move = False
@@ -105,22 +115,30 @@ class Session:
 
     def run(self) -> Ending:
         """Run all phases; the robot is stopped whatever happens."""
-        ending = Ending("fault", "ended without a cause")
+        for _ in self.steps():
+            pass
+        return self.ending
+
+    def steps(self) -> Generator[Situation]:
+        """Run all phases, pausing at each tick before the law is asked; then `ending` says how it was.
+
+        Time of a simulated rig stands still in a pause. Closing the iterator stops the robot.
+        """
         try:
             self._connect()
             self._find_robot()
             self._arm()
-            self._control()
-            ending = Ending("complete")
+            yield from self._control()
+            self.ending = Ending("complete")
         except RigFault as fault:
-            ending = Ending("fault", str(fault))
-        except KeyboardInterrupt:
-            ending = Ending("interrupted", "Ctrl-C")
+            self.ending = Ending("fault", str(fault))
+        except (KeyboardInterrupt, GeneratorExit) as stop:
+            by = "Ctrl-C" if isinstance(stop, KeyboardInterrupt) else "closed before its end"
+            self.ending = Ending("interrupted", by)
         finally:
             self._stop()
-        self._note(ending.outcome, ending.detail)
+        self._note(self.ending.outcome, self.ending.detail)
         self._parts.timeline.start(self._parts.rig.now_s())
-        return ending
 
     # -- phases --------------------------------------------------------------------------------
 
@@ -172,7 +190,7 @@ class Session:
             raise RigFault(f"board: acknowledged arming and stayed {link.state_name}")
         self._note("armed", link.state_name)
 
-    def _control(self) -> None:
+    def _control(self) -> Generator[Situation]:
         scenario, rig, law = self._scenario, self._parts.rig, self._parts.law
         period_s = 1.0 / scenario.control.rate_hz
         ticks = round(scenario.duration_s * scenario.control.rate_hz) + 1
@@ -188,6 +206,7 @@ class Session:
             self._supervisor.check(now_s, self._parts.link, self._report)
             estimate = self._estimate(now_s + self._uplink_s)
             reference = self._parts.reference.at(estimate.t_host_s - self._t0_s)
+            yield Situation(now_s - self._t0_s, reference, estimate)
             if tick == 0:
                 law.reset(reference, estimate)
             command = law.step(reference, estimate, period_s)

@@ -281,7 +281,7 @@ def with_origin(
 
 def write_gain_set(path: Path, gains: Gains) -> None:
     """Write a gain file as hil/data/gains holds them."""
-    lines = ["# Written by hil.study.tune; not edited by hand."]
+    lines = ["#:schema ../schemas/gains.json", "# Written by hil.study.tune; not edited by hand."]
     for table, values in gains.model_dump().items():
         lines += ["", f"[{table}]"]
         lines += [

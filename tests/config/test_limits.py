@@ -154,7 +154,7 @@ def _board_after(scenario: Scenario, key: str, value: float) -> dict[str, float]
 def test_a_host_value_that_becomes_a_parameter_has_the_parameters_bounds() -> None:
     """Walk all: where a change of a host value changes what the board is given, bounds are one."""
     # Slow wheels, so that the board can count whatever encoder there is.
-    scenario = load_scenario("scenario-1", ["board.OVER_W=19", "board.W_MAX=19"])
+    scenario = load_scenario("scenario-1", ["board.OVER_W=5", "board.W_MAX=5"])
     before = board_parameters(scenario, "pid")
     shared = {}
     for setting in _host_values(scenario):

@@ -49,10 +49,10 @@ def metric_of(figure: str) -> Metric:
 class Range(Section):
     """Evenly spaced points from `first` to `last`, or in equal ratios."""
 
-    first: float
-    last: float
-    count: int = Field(ge=2, le=10_000)
-    scale: Literal["linear", "log"] = "linear"
+    first: float = Field(description="first point")
+    last: float = Field(description="last point")
+    count: int = Field(ge=2, le=10_000, description="points, both ends among them")
+    scale: Literal["linear", "log"] = Field("linear", description="equal steps or equal ratios")
 
     @model_validator(mode="after")
     def _positive(self) -> Self:
@@ -74,11 +74,11 @@ class Distribution(Section):
     What falls outside low..high of a normal one is drawn again, so the bounds hold no pile of rows.
     """
 
-    kind: Literal["uniform", "loguniform", "normal"]
-    low: float = -math.inf
-    high: float = math.inf
-    mean: float = 0.0
-    sd: float = Field(1.0, gt=0)
+    kind: Literal["uniform", "loguniform", "normal"] = Field(description="of the distribution")
+    low: float = Field(-math.inf, description="least value")
+    high: float = Field(math.inf, description="largest value")
+    mean: float = Field(0.0, description="of a normal one")
+    sd: float = Field(1.0, gt=0, description="standard deviation of a normal one")
 
     model_config = Section.model_config | {"allow_inf_nan": True}
 
@@ -120,10 +120,12 @@ class CampaignFile(Section):
     name: PlainName = Field(min_length=1, max_length=80, description="names the results' folder")
     scenario: str = Field(description="built-in name or TOML file")
     set: tuple[str, ...] = Field((), description="KEY=VALUE in force in every run")
-    target: Literal["twin", "pil"] = "twin"
-    camera: Literal["pose", "rendered"] = "pose"
-    outer: tuple[OuterLawName, ...] = Field(("pid", "asg-ism"), min_length=1)
-    inner: tuple[InnerLawName, ...] = Field(("asg-ism",), min_length=1)
+    target: Literal["twin", "pil"] = Field("twin", description="simulated target")
+    camera: Literal["pose", "rendered"] = Field("pose", description="drawn poses or pictures")
+    outer: tuple[OuterLawName, ...] = Field(
+        ("pid", "asg-ism"), min_length=1, description="outer laws"
+    )
+    inner: tuple[InnerLawName, ...] = Field(("asg-ism",), min_length=1, description="wheel laws")
     seed: int = Field(1, ge=0, description="first seed")
     seeds: int = Field(1, ge=1, le=100_000, description="seeds a point")
     draws: int = Field(1, ge=1, le=1_000_000, description="draws of `random` a point")
@@ -131,7 +133,9 @@ class CampaignFile(Section):
     together: tuple[dict[str, list[Any]], ...] = Field(
         (), description="lists of equal length, taken in step"
     )
-    random: dict[str, Distribution] = Field(default_factory=dict)
+    random: dict[str, Distribution] = Field(
+        default_factory=dict, description="values drawn by dotted key"
+    )
     figures: tuple[str, ...] = Field(
         ("ise_m2_s", "pwm_variation_counts"), min_length=1, description="figures drawn, or holds"
     )
