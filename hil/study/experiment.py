@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING, Any
 from hil.config.fit import check_fit
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput
+from hil.core.files import replace_file
 from hil.record import layout
-from hil.record.manifest import read_manifest, replace_file
+from hil.record.manifest import read_manifest
 from hil.report.circle import CircleStudy
 from hil.report.compare import compare_runs, refuse_other_task, to_json
 from hil.report.repeats import Repeats, repeats_of

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from hil.config.limits import check_board
 from hil.core.errors import BadInput
-from hil.record.manifest import replace_file
+from hil.core.files import replace_file
 from hil.rigs.serial import SerialRig, parse_target
 from hil.wire import handshake
 from hil.wire.link import BoardLink

@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 
 from hil.core.errors import BadInput
 from hil.core.figures import METRICS
-from hil.record.manifest import replace_file
+from hil.core.files import replace_file
 from hil.study.campaign.plan import Campaign, Job
 
 Row = dict[str, Any]
