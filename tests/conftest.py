@@ -6,6 +6,9 @@ import os
 
 import pytest
 
+# Commands that tests run do not write into the summary of the CI job that runs the tests.
+os.environ.pop("GITHUB_STEP_SUMMARY", None)
+
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     """Fail the run when anything was skipped and HIL_NO_SKIPS is set (as in CI)."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from hil.cli.ci import junit_file, junit_option, tell_ci
 from hil.cli.options import json_option, print_json
 from hil.core.text import visible
 
@@ -22,12 +23,14 @@ if TYPE_CHECKING:
               metavar="FILE.csv", help="Write every run's figures as CSV.")  # fmt: skip
 @click.option("--rerun", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.rrd",
               help="Write all runs as one recording for the viewer, on a common timeline.")  # fmt: skip
+@junit_option
 @json_option
 def command(
     runs: tuple[Path, ...],
     report: Path | None,
     csv_file: Path | None,
     rerun: Path | None,
+    junit: Path | None,
     as_json: bool,
 ) -> int:
     """Compare two or more run records of one scenario.
@@ -42,7 +45,8 @@ def command(
     from hil.runs.execute import judged_status
     from hil.study.experiment import study
 
-    records = [read_run(run) for run in runs]
+    with junit_file(junit, "compare"):
+        records = [read_run(run) for run in runs]
     found = study(records)
     if report is not None:
         repeats = [found.repeats] if found.repeats else []
@@ -53,6 +57,7 @@ def command(
         from hil.record.rrd import write_rrd
 
         write_rrd(rerun, records)
+    tell_ci(records, "hil compare", junit=junit, report=report)
     if as_json:
         print_json(found.to_json())
         return judged_status(records)

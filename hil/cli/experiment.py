@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from hil.cli.ci import junit_file, junit_option, tell_ci
 from hil.cli.compare import print_study
 from hil.cli.options import (
     INNER_LAWS,
@@ -32,6 +33,7 @@ from hil.core.text import visible
 @seed_option
 @set_option
 @out_option
+@junit_option
 @json_option
 def command(
     deck: str,
@@ -42,6 +44,7 @@ def command(
     seed: int,
     overrides: tuple[str, ...],
     out: Path | None,
+    junit: Path | None,
     as_json: bool,
 ) -> int:
     """Run every scenario of DECK with both laws and write one report.
@@ -70,11 +73,12 @@ def command(
     conditions = Conditions(target, camera, inner, seed, repeats, overrides, command_line())
     folder = out or new_folder("experiment")
     specs = deck_specs(load_deck(deck), conditions, folder)
-    todo = claim(folder, specs)
-    if len(todo) < len(specs):
-        click.echo(f"{len(specs) - len(todo)} of {len(specs)} runs are there already", err=True)
-    with run_progress({run_name(spec): spec.scenario.duration_s for spec in todo}) as update:
-        run_all(todo, update)
+    with junit_file(junit, f"experiment.{deck}"):
+        todo = claim(folder, specs)
+        if len(todo) < len(specs):
+            click.echo(f"{len(specs) - len(todo)} of {len(specs)} runs are there already", err=True)
+        with run_progress({run_name(spec): spec.scenario.duration_s for spec in todo}) as update:
+            run_all(todo, update)
     records = [read_run(spec.out) for spec in specs]
     report = folder / "report.html"
     studies = study_by_scenario(records)
@@ -85,6 +89,7 @@ def command(
         circle=circle_study(),
         repeats=[item.repeats for item in studies if item.repeats],
     )
+    tell_ci(records, f"hil experiment {deck}", junit=junit, report=report)
     if as_json:
         print_json({"report": str(report), "comparisons": [item.to_json() for item in studies]})
     else:
