@@ -66,8 +66,10 @@ def hil_run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     try:
         asked = inspect.signature(_run).bind(folder, request.path.parent, *mark.args, **mark.kwargs)
     except TypeError as error:
-        pytest.fail(f"marker {_MARK}: {error}", pytrace=False)
-    return _run(*asked.args, **asked.kwargs)
+        said = str(error)
+    else:
+        return _run(*asked.args, **asked.kwargs)
+    pytest.fail(f"marker {_MARK}: {said}", pytrace=False)
 
 
 @pytest.fixture
@@ -177,7 +179,8 @@ def _run(
         )
         return execute(spec)
     except HilError as error:
-        pytest.fail(f"hil: {error}", pytrace=False)
+        said = str(error)
+    pytest.fail(f"hil: {said}", pytrace=False)
 
 
 def _found(name: str, beside: Path) -> str:

@@ -197,7 +197,6 @@ def test_a_fault_of_the_rig_fails_with_its_cause(results: Results) -> None:
 )
 def test_input_that_is_refused_is_one_line(results: Results, test: str, said: str) -> None:
     """What the command would say, without a traceback, as an error and not as a failure."""
-    first, *rest = results.text("error", test).strip().split("\n")
-    assert said in first
-    assert len(rest) == 1  # pytest gives it once as the message and once as the text
-    assert said in rest[0]
+    lines = results.text("error", test).strip().split("\n")
+    assert len(lines) == 2, lines  # pytest gives it once as the message and once as the text
+    assert all(said in line for line in lines)
