@@ -181,9 +181,13 @@ def tag_bits(name: str, number: int) -> NDArray[np.bool_]:
     return np.asarray(cv2.aruco.generateImageMarker(family, number, cells)) < 128
 
 
-def charuco_board(columns: int, rows: int, square: float, marker: float, name: str) -> CharucoBoard:
-    """Return a ChArUco board of columns x rows squares."""
-    return cv2.aruco.CharucoBoard((columns, rows), square, marker, dictionary(name))
+def charuco_board(
+    columns: int, rows: int, square: float, marker: float, name: str, *, old: bool = False
+) -> CharucoBoard:
+    """Return a ChArUco board of columns x rows squares, `old` for the pattern before OpenCV 4.6."""
+    board = cv2.aruco.CharucoBoard((columns, rows), square, marker, dictionary(name))
+    board.setLegacyPattern(old)
+    return board
 
 
 def detect_charuco(board: CharucoBoard, image: Image, enlarge: int = 1) -> tuple[Ids, Array]:

@@ -26,7 +26,7 @@ FLOOR_HELD_OUT_MAX_MM = 20.0
 board_option = click.option(
     "--board", "board_text", default=BOARD, show_default=True, metavar="BOARD",
     help="charuco:COLUMNSxROWS:SQUARE_MM:MARKER_MM or chess:COLUMNSxROWS:SQUARE_MM, in squares; "
-    "sizes as measured on the print.",
+    "sizes as measured on the print. charuco-old: printed before OpenCV 4.6.",
 )  # fmt: skip
 detector_option = click.option(
     "--detector", type=click.Choice(["sector", "classic"]), default="sector", show_default=True,
@@ -248,7 +248,7 @@ def _pairs(
     points: Path | None,
 ) -> PointPairs:
     """Return the world-image pairs by whichever method was asked for."""
-    from vision.calibration.boards import parse_board
+    from vision.calibration.boards import not_seen_hint, parse_board
     from vision.calibration.points import (
         PointPairs,
         pairs_of_board,
@@ -272,7 +272,8 @@ def _pairs(
     for k, (name, image) in enumerate(images):
         view = known.find(image, name)
         if view is None:
-            raise BadInput(f"{name}: board {board_text} not seen; is it whole, flat and in focus?")
+            hint = not_seen_hint(known, image) or "; is it whole, flat and in focus?"
+            raise BadInput(f"{name}: board {board_text} not seen{hint}")
         parts.append(pairs_of_board(known, view, where[k if len(where) > 1 else 0]))
     return PointPairs.joined(parts)
 

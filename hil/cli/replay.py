@@ -110,6 +110,10 @@ def print_report(report: ReplayReport) -> None:
     for problem in report.problems:
         console.print(f"note: {visible(problem)}")
     console.print(visible(headline(report)))
+    if report.kind == "shadow":
+        for line in shadow_lines(report):
+            console.print(visible(line))
+        return
     different = [channel for channel in report.channels if not channel.same]
     if not different:
         return
@@ -121,6 +125,29 @@ def print_report(report: ReplayReport) -> None:
             console.print(f"  {channel.text()}")
     same = ", ".join(channel.name for channel in report.channels if channel.same)
     console.print(f"identical: {same or 'no channel'}")
+
+
+def shadow_lines(report: ReplayReport) -> list[str]:
+    """Return how far apart the commands of the two laws are, in their units; the rest is counted."""
+    from hil.record.schema import SAMPLE_COLUMNS
+    from hil.replays.exact import COMMANDS
+
+    columns = {column.name: column for column in SAMPLE_COLUMNS}
+    by_name = {channel.name: channel for channel in report.channels}
+    lines = []
+    for name in COMMANDS:
+        channel, unit = by_name[name], columns[name].unit
+        apart = (
+            "the same in every row"
+            if channel.same
+            else f"{channel.rms:.3g} {unit} apart (RMS), {channel.largest:.3g} {unit} at most, first "
+            f"at t = {channel.first_s:.3f} s"
+        )
+        lines.append(f"  {columns[name].meaning}: {apart}")
+    others = [c for c in report.channels if c.name not in COMMANDS and not c.same]
+    if others:
+        lines.append(f"  {len(others)} further channels differ; --json or --out DIR has them all")
+    return lines
 
 
 def headline(report: ReplayReport) -> str:

@@ -164,14 +164,14 @@ def read_events(path: Path) -> tuple[Event, ...]:
 
 
 def picture_name(t_s: float) -> str:
-    """Return the file name of the picture that arrived at `t_s`."""
-    return f"{t_s:08.3f}s.jpg"
+    """Return the file name of the picture that arrived at `t_s`; no name begins with a dash."""
+    return f"t{t_s:08.3f}s.jpg"
 
 
 def read_pictures(folder: Path) -> tuple[Picture, ...]:
-    """Return the pictures of a record in time order."""
+    """Return the pictures of a record in time order; older records name them without the t."""
     pictures = []
     for file in folder.glob("*s.jpg"):
         with contextlib.suppress(ValueError):  # somebody else's file
-            pictures.append(Picture(float(file.stem.removesuffix("s")), file))
+            pictures.append(Picture(float(file.stem.removeprefix("t").removesuffix("s")), file))
     return tuple(sorted(pictures, key=lambda picture: picture.t_s))

@@ -59,6 +59,7 @@ class RunSpec:
     seed: int
     out: Path
     record_camera: bool = False
+    small_video: bool = False
     rerun: bool = True
     command: str = ""
 
@@ -120,6 +121,7 @@ def execute(
             make_manifest(spec),
             plugins=plugins_of(spec),
             record_camera=spec.record_camera,
+            small_video=spec.small_video,
             frame_rate_hz=spec.scenario.camera.rate_hz,
             rerun=spec.rerun,
         )

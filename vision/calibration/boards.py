@@ -8,7 +8,7 @@ be seen whole, and one with an even-even or odd-odd number of squares looks the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -40,14 +40,14 @@ def inner_corners(columns: int, rows: int, square_m: float) -> Array:
     return np.asarray(grid * square_m, dtype=np.float64)
 
 
-def _black_squares(columns: int, rows: int, square_m: float) -> list[Rect]:
-    """Return the squares of the checker, the one at the top left being black."""
+def _black_squares(columns: int, rows: int, square_m: float, first: int = 0) -> list[Rect]:
+    """Return the squares of the checker; the one at the top left is black when `first` is 0."""
     a = square_m
     return [
         (i * a, (rows - 1 - j) * a, a, a)
         for j in range(rows)
         for i in range(columns)
-        if (i + j) % 2 == 0
+        if (i + j) % 2 == first
     ]
 
 
@@ -102,18 +102,31 @@ def _black_between(image: Image, corners: Array) -> bool:
 
 @dataclass(frozen=True)
 class Charuco:
-    """A chessboard with a numbered tag in each white square."""
+    """A chessboard with a numbered tag in each white square.
+
+    `old` is the pattern printed before OpenCV 4.6: with an even number of rows its square at the top
+    left is white.
+    """
 
     columns: int
     rows: int
     square_m: float
     marker_m: float
     dictionary: str = "DICT_4X4_250"
+    old: bool = False
+
+    @property
+    def _first_black(self) -> int:
+        return int(self.old and self.rows % 2 == 0)
+
+    def other_print(self) -> Charuco | None:
+        """Return the board of the other OpenCV versions, None where both print the same."""
+        return replace(self, old=not self.old) if self.rows % 2 == 0 else None
 
     @cached_property
     def _cv_board(self) -> cv_compat.CharucoBoard:
         return cv_compat.charuco_board(
-            self.columns, self.rows, self.square_m, self.marker_m, self.dictionary
+            self.columns, self.rows, self.square_m, self.marker_m, self.dictionary, old=self.old
         )
 
     def find(self, image: Image, name: str = "") -> BoardView | None:
@@ -130,8 +143,11 @@ class Charuco:
 
     def black(self) -> list[Rect]:
         """Return the black squares and the black cells of every tag."""
-        rects = _black_squares(self.columns, self.rows, self.square_m)
-        white = [(i, j) for j in range(self.rows) for i in range(self.columns) if (i + j) % 2 == 1]
+        first = self._first_black
+        rects = _black_squares(self.columns, self.rows, self.square_m, first)
+        white = [
+            (i, j) for j in range(self.rows) for i in range(self.columns) if (i + j) % 2 != first
+        ]
         margin = 0.5 * (self.square_m - self.marker_m)
         for number, (i, j) in enumerate(white):
             corner = (i * self.square_m + margin, (self.rows - 1 - j) * self.square_m + margin)
@@ -156,11 +172,25 @@ def tag_cells(name: str, number: int, corner_m: tuple[float, float], side_m: flo
 Board = Chessboard | Charuco
 
 
+def not_seen_hint(board: Board, image: Image) -> str:
+    """Return what is seen in place of the board: the same with the squares the other way round."""
+    other = board.other_print() if isinstance(board, Charuco) else None
+    if other is None or other.find(image) is None:
+        return ""
+    name = "charuco-old" if other.old else "charuco"
+    sizes = f"{other.columns}x{other.rows}:{other.square_m * 1e3:g}:{other.marker_m * 1e3:g}"
+    return (
+        "; its tags are seen with black and white squares the other way round (printed by OpenCV"
+        f" {'before' if other.old else 'from'} 4.6): describe it as {name}:{sizes}"
+    )
+
+
 def parse_board(text: str, detector: str = "sector") -> Board:
     """Return the board that a description names.
 
     `charuco:COLUMNSxROWS:SQUARE_MM:MARKER_MM[:DICTIONARY]` or `chess:COLUMNSxROWS:SQUARE_MM`, in
-    squares and not in inner corners. Raises BadInput.
+    squares and not in inner corners; `charuco-old:` for one printed before OpenCV 4.6. Raises
+    BadInput.
     """
     kind, *rest = text.split(":")
     try:
@@ -169,8 +199,10 @@ def parse_board(text: str, detector: str = "sector") -> Board:
         board: Board
         if kind == "chess" and len(rest) == 2:
             board = Chessboard(columns, rows, sizes_m[0], detector)
-        elif kind == "charuco" and len(rest) in {3, 4}:
-            board = Charuco(columns, rows, sizes_m[0], sizes_m[1], *rest[3:])
+        elif kind in {"charuco", "charuco-old"} and len(rest) in {3, 4}:
+            board = Charuco(columns, rows, sizes_m[0], sizes_m[1], old=kind == "charuco-old")
+            if len(rest) == 4:
+                board = replace(board, dictionary=rest[3])
         else:
             raise ValueError
     except (ValueError, IndexError):

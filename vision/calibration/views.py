@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hil.core.errors import BadInput
 from vision import cv_compat
-from vision.calibration.boards import Board, BoardView
+from vision.calibration.boards import Board, BoardView, not_seen_hint
 from vision.calibration.intrinsics import advise, coverage, slant_deg
 from vision.sources import ImageFolder, LiveCamera, VideoFile
 
@@ -33,6 +33,12 @@ class Views:
     size_px: tuple[int, int]
     views: list[BoardView] = field(default_factory=list)
     missed: list[str] = field(default_factory=list)
+    hint: str = ""
+
+    def look_for_other(self, board: Board, image: Image) -> None:
+        """Keep what is seen in place of the board, as long as nothing else was."""
+        if not self.views and not self.hint:
+            self.hint = not_seen_hint(board, image)
 
 
 def views_of_folder(board: Board, folder: Path, report: Report) -> Views:
@@ -46,6 +52,7 @@ def views_of_folder(board: Board, folder: Path, report: Report) -> Views:
         report(f"{name}: {'board not seen' if view is None else f'{len(view.px)} corners'}")
         if view is None:
             found.missed.append(name)
+            found.look_for_other(board, frame.image)
         else:
             found.views.append(view)
     return _require_views(found, f"{len(source.files)} images of {folder}")
@@ -64,7 +71,10 @@ def views_of_video(board: Board, path: Path, report: Report) -> Views:
         assert frame.image is not None
         looked += 1
         name = f"frame {frame.index} at {frame.t_cam_s:.2f} s"
-        view = picker.offer(board.find(frame.image, name))
+        seen = board.find(frame.image, name)
+        if seen is None:
+            found.look_for_other(board, frame.image)
+        view = picker.offer(seen)
         if view is not None:
             found.views.append(view)
             report(f"{name}: view {len(found.views)}, {len(view.px)} corners")
@@ -94,7 +104,8 @@ def views_of_camera(board: Board, camera: LiveCamera, wanted: int, report: Repor
 
 def _require_views(found: Views, where: str) -> Views:
     if not found.views:
-        raise BadInput(f"board not seen in any of {where}; is it the board described?")
+        hint = found.hint or "; is it the board described?"
+        raise BadInput(f"board not seen in any of {where}{hint}")
     return found
 
 
