@@ -22,7 +22,10 @@ COMMANDS = {
     ),
     "compare": ("hil.cli.compare", "Compare recorded runs: table, JSON and HTML report."),
     "replay": ("hil.cli.replay", "Replay a record exactly, or with another law as its shadow."),
-    "import": ("hil.cli.importing", "Make a record of a MAVLink .tlog or a CSV file."),
+    "import": (
+        "hil.cli.importing",
+        "Make a record of another program's log: .tlog .bin .ulg .mcap, CSV.",
+    ),
     "view": ("hil.cli.view", "Open recorded runs in the viewer."),
     "sweep": ("hil.cli.sweep", "Run a campaign over grids, lists and distributions; draw maps."),
     "tune": ("hil.cli.tune", "Tune the gains of both laws by one procedure and budget."),

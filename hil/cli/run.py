@@ -165,9 +165,7 @@ def print_summary(record: RunRecord) -> None:
     console.print(visible(line + said(manifest.outcome_detail)))
     for item in record.verdicts():
         mark = ("holds", "green") if item.holds else ("FAILS", "red")
-        is_now = (
-            f"is {item.value:.4g}" if math.isfinite(item.value) else "has no value in this run"
-        )
+        is_now = f"is {item.value:.4g}" if math.isfinite(item.value) else "has no value in this run"
         console.print(Text.assemble("  ", mark, f"  {item.text()}   ({is_now})"))
     for note in manifest.notes:
         console.print(Text.assemble(("note:", "yellow"), f" {visible(note)}"))

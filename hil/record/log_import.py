@@ -1,4 +1,4 @@
-"""Logs of other programs made into run records: MAVLink telemetry logs, and CSV with a mapping.
+"""Logs of other programs made into run records: MAVLink telemetry, DataFlash, ULog, MCAP, CSV.
 
 A mapping (TOML) says what the run was and where each column of `samples.parquet` comes from:
 
@@ -9,7 +9,7 @@ A mapping (TOML) says what the run was and where each column of `samples.parquet
     est_x_m = { column = "X_mm", scale = 0.001 }
     est_theta_rad = { message = "ATTITUDE", field = "yaw", scale = -1.0, offset = 1.5707963 }
 
-Of a telemetry log, poses and commands of standard messages need no mapping. Columns nobody gives
+Poses and commands of standard messages of MAVLink, ArduPilot and PX4 need no mapping. Columns nobody gives
 stay empty, but for those that follow: speeds from the pose, delta1 from pose and reference, wheel
 commands from body commands. What was left out, repaired or assumed is said in notes, which are
 also events of the record.
@@ -17,6 +17,7 @@ also events of the record.
 
 from __future__ import annotations
 
+import importlib
 import math
 import time
 from dataclasses import dataclass
@@ -33,6 +34,7 @@ from hil.record.log_csv import read_csv
 from hil.record.log_mapping import LogMapping, read_mapping
 from hil.record.log_signals import Signals
 from hil.record.log_telemetry import read_tlog
+from hil.record.log_topics import signals_of
 from hil.record.manifest import Manifest, collect_versions, git_revision
 from hil.record.recorder import Recorder
 from hil.record.schema import SAMPLE_NAMES
@@ -40,8 +42,15 @@ from hil.record.schema import SAMPLE_NAMES
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
     from hil.record.log_signals import Array
+    from hil.record.log_topics import TopicLog
     from hil.record.reader import RunRecord
 
+# Ending of the name -> (module, reader), imported when one is read.
+_TOPIC_READERS = {
+    ".bin": ("hil.record.log_dataflash", "read_dataflash"),
+    ".ulg": ("hil.record.log_ulog", "read_ulog"),
+    ".mcap": ("hil.record.log_mcap", "read_mcap"),
+}
 # Faster than this no small wheeled robot drives: the rows are of two, or in another unit.
 _SPEED_BELIEVED_M_S = 5.0
 
@@ -58,7 +67,7 @@ def import_log(log: Path, mapping: Path | None, out: Path, command: str) -> Impo
     """Make a run record of a foreign log in the new folder `out`; raises BadInput."""
     settings = read_mapping(mapping)
     scenario = load_scenario(_beside(mapping, settings.scenario), settings.set)
-    signals = read_tlog(log, settings) if log.suffix.lower() == ".tlog" else read_csv(log, settings)
+    signals = _read(log, settings)
     columns = _completed(signals, scenario)
     notes = (*signals.notes, *_doubts(columns), *_assumed(settings, scenario, columns["t_s"]))
     recorder = Recorder(out, _manifest(log, scenario, settings, command))
@@ -71,6 +80,18 @@ def import_log(log: Path, mapping: Path | None, out: Path, command: str) -> Impo
     for note in notes:
         recorder.event(0.0, "note", note)
     return Imported(recorder.close("complete", f"imported from {log.name}"), notes)
+
+
+def _read(log: Path, settings: LogMapping) -> Signals:
+    """Return what a log says, by the reader of its name's ending; raises BadInput."""
+    suffix = log.suffix.lower()
+    if suffix == ".tlog":
+        return read_tlog(log, settings)
+    if suffix not in _TOPIC_READERS:
+        return read_csv(log, settings)
+    module, reader = _TOPIC_READERS[suffix]
+    found: TopicLog = getattr(importlib.import_module(module), reader)(log)
+    return signals_of(found, settings)
 
 
 def _assumed(settings: LogMapping, scenario: Scenario, t_s: Array) -> list[str]:
