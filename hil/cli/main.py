@@ -26,6 +26,7 @@ COMMANDS = {
         "hil.cli.importing",
         "Make a record of another program's log: .tlog .bin .ulg .mcap, CSV.",
     ),
+    "export": ("hil.cli.export", "Write a record as MCAP (Foxglove), ULog (PX4) or CSV."),
     "view": ("hil.cli.view", "Open recorded runs in the viewer."),
     "sweep": ("hil.cli.sweep", "Run a campaign over grids, lists and distributions; draw maps."),
     "tune": ("hil.cli.tune", "Tune the gains of both laws by one procedure and budget."),

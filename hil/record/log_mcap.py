@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hil.core.errors import BadInput
-from hil.record.log_signals import read_bytes
+from hil.record.log_signals import MOST_BYTES, read_bytes
 from hil.record.log_topics import Topic, TopicLog
 from hil.record.log_walk import Holes, walk
 
@@ -98,6 +98,8 @@ class _Content:
     def _chunk(self, chunk: Any) -> None:
         from mcap.stream_reader import get_chunk_data_stream  # noqa: PLC0415 - an extra
 
+        if chunk.uncompressed_size > MOST_BYTES:
+            raise ValueError("larger than any log that is read")
         stream, size = get_chunk_data_stream(chunk, validate_crc=True)
         data = stream.read(size)
         at = 0

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from hil.record.log_signals import Array
 
 
+_LATEST_S = 4e9  # the year 2096, as a wall time
+
+
 @dataclass(frozen=True, slots=True)
 class Topic:
     """The messages of one topic in the order of the log: their times and their number fields."""
@@ -84,7 +87,12 @@ def _series(
     def refusal(k: int) -> str:
         return f"{log.path}: {source.message} no. {k + 1}: {fall_text(t_s[k - 1], t_s[k])}"
 
+    damaged = ~(np.abs(t_s) < _LATEST_S)
+    t_s = np.where(damaged, np.nan, t_s)
     places, notes = in_order(t_s, disorder, refusal, f"messages of {source.message}")
+    if damaged.any():
+        count = np.count_nonzero(damaged)
+        notes.append(f"{count} of {t_s.size} messages of {source.message} have no time: left out")
     return t_s[places], scaled(values, source)[places], notes
 
 

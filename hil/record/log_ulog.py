@@ -62,7 +62,10 @@ def read_ulog(path: Path) -> TopicLog:
     lost = [dropout.duration for dropout in log.dropouts]
     if lost:
         holes.others.append(f"the logger dropped messages {len(lost)} times, {sum(lost)} ms in all")
-    return TopicLog(path, _topics(log), STANDARD, tuple(holes.notes()))
+    timed = [item for item in log.data_list if "timestamp" in item.data]
+    if len(timed) < len(log.data_list):
+        holes.others.append(f"{len(log.data_list) - len(timed)} topics without a time: left out")
+    return TopicLog(path, _topics(timed), STANDARD, tuple(holes.notes()))
 
 
 def _without_holes(data: bytes, holes: Holes) -> bytes:
@@ -83,10 +86,10 @@ def _without_holes(data: bytes, holes: Holes) -> bytes:
     return b"".join(pieces)
 
 
-def _topics(log: Any) -> dict[str, Topic]:
+def _topics(data: list[Any]) -> dict[str, Topic]:
     """Return every instance of every topic; the plain name is the first instance's."""
     found: dict[str, Topic] = {}
-    for item in sorted(log.data_list, key=lambda item: (item.name, item.multi_id)):
+    for item in sorted(data, key=lambda item: (item.name, item.multi_id)):
         fields = {name: np.asarray(values, dtype=np.float64) for name, values in item.data.items()}
         topic = Topic(fields["timestamp"] * 1e-6, fields)
         found[f"{item.name}[{item.multi_id}]"] = topic
