@@ -12,6 +12,8 @@ import os
 from collections.abc import Collection
 from pathlib import Path
 
+from hil.core.files import replace_file
+
 # Read by OpenCV's video backend when it opens its first file.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
@@ -100,12 +102,9 @@ def require_place(path: Path | None, suffixes: Collection[str] = ()) -> None:
 
 def write_atomic(path: Path, data: bytes) -> None:
     """Write a file beside its place and move it there; BadInput when the folder cannot be used."""
-    beside = path.with_name(f".{path.name}.part")
     try:
-        beside.write_bytes(data)
-        beside.replace(path)
+        replace_file(path, data)
     except OSError as error:
-        beside.unlink(missing_ok=True)
         raise BadInput(f"{path}: cannot be written: {error.strerror}") from None
 
 

@@ -18,6 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from hil.core.errors import BadInput
+from hil.core.files import replacing
 from hil.record.schema import Column
 
 if TYPE_CHECKING:
@@ -81,9 +82,8 @@ def write_parquet(path: Path, columns: Columns, schema: Sequence[Column]) -> Non
         fields.append(pa.field(column.name, array.type, metadata=notes))
         arrays.append(array)
     table = pa.Table.from_arrays(arrays, schema=pa.schema(fields))
-    part = path.with_name(f"{path.name}.part")
-    pq.write_table(table, part, compression="zstd", use_dictionary=False)
-    part.replace(path)
+    with replacing(path) as part:
+        pq.write_table(table, part, compression="zstd", use_dictionary=False)
 
 
 def _arrow_array(values: NDArray[np.float64], column: Column) -> pa.Array:

@@ -64,12 +64,6 @@ class Windows(NamedTuple):
 
     values: dict[str, Array]
 
-    def stacked(self, chosen: NDArray[np.bool_]) -> Array:
-        """Return the chosen windows as one vector in units of _SCALES."""
-        return np.concatenate(
-            [(self.values[name][chosen] / scale).ravel() for name, scale in _SCALES.items()]
-        )
-
 
 @dataclass(frozen=True, slots=True)
 class Fit:

@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 
 from hil.core.errors import BadInput
 from hil.core.figures import METRICS
-from hil.core.files import replace_file
+from hil.core.files import replace_file, replacing
 from hil.study.campaign.plan import Campaign, Job
 
 Row = dict[str, Any]
@@ -121,9 +121,8 @@ class ResultStore:
 
 
 def _write(path: Path, table: pa.Table) -> None:
-    part = path.with_name(f"{path.name}.part")
-    pq.write_table(table, part, compression="zstd")
-    part.replace(path)
+    with replacing(path) as part:
+        pq.write_table(table, part, compression="zstd")
 
 
 def row_of(
