@@ -62,13 +62,3 @@ def _cell(value: float, column: Column) -> str:
     if not math.isfinite(value):
         return ""
     return repr(value) if column.kind == "float64" else str(int(value))
-
-
-def groups(run: RunRecord) -> dict[str, list[Column]]:
-    """Return the columns that have any value, by their group; time is in none of them."""
-    found: dict[str, list[Column]] = {}
-    for column in SAMPLE_COLUMNS:
-        values = run.samples[column.name]
-        if column.name != "t_s" and any(map(math.isfinite, values.tolist())):
-            found.setdefault(column.group, []).append(column)
-    return found

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from mcap.writer import CompressionType, Writer
 
-from hil.record.export import groups
+from hil.record.export_groups import groups
 
 if TYPE_CHECKING:
     from hil.record.reader import RunRecord

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pyulog import ULog
 
-from hil.record.export import groups
+from hil.record.export_groups import groups
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
