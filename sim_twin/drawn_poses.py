@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from importlib.resources import files
 from random import Random
 from typing import TYPE_CHECKING
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING
 from pydantic import Field
 
 from hil.config.base import Section
+from hil.core.files import parse_toml
 from hil.core.types import Pose, PoseMeasurement, wrap_pi
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class LocaliserError(Section):
 def load_localiser_error() -> LocaliserError:
     """Return the statistics that ship with the twin."""
     text = (files("hil") / "data" / "localiser_error.toml").read_text(encoding="utf-8")
-    return LocaliserError.model_validate(tomllib.loads(text))
+    return LocaliserError.model_validate(parse_toml(text, "localiser_error.toml"))
 
 
 # A bias that stands with the place: waves over the floor and the heading, so short that places a few

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.board.build import Build, build, find_toolchain
+from hil.config.link import UART_BAUD
 from hil.core.errors import BadInput
 from sim_twin.twin import FrameMaker, Twin, TwinSetup
 
 if TYPE_CHECKING:
     from sim_twin import _pil
 
-UART_BAUD = 57_600  # of both serial ports, firmware_arduino/src/board/uart.h
 PACKAGES = "libsimavr-dev libelf-dev"
 
 

@@ -7,6 +7,9 @@ import signal
 
 import pytest
 
+# Commands that tests run do not write into the summary of the CI job that runs the tests.
+os.environ.pop("GITHUB_STEP_SUMMARY", None)
+
 
 def pytest_configure() -> None:
     """Take Ctrl-C as a terminal gives it: a shell's background jobs begin with it ignored."""

@@ -1,9 +1,10 @@
 """Pinhole camera with lens distortion at a known pose over the floor.
 
-Frames: world is right-handed, X right and Y up on the floor, z up, metres. Camera is OpenCV's:
-x to the right of the image, y down, z along the optical axis. `T_world_cam` takes camera
-coordinates to world coordinates, so its translation is the camera's centre. Pixel (0, 0) is the
-centre of the first pixel. Distortion is OpenCV's five-term model (k1, k2, p1, p2, k3).
+Frames: world is right-handed, X right and Y up on the floor, z up, metres. Camera is OpenCV's: x
+to the right of the image, y down, z along the optical axis. The pose, `R_world_cam` and
+`t_world_cam_m`, takes camera coordinates to world coordinates, so the latter is the camera's
+centre. Pixel (0, 0) is the centre of the first pixel. Distortion is OpenCV's five-term model (k1,
+k2, p1, p2, k3).
 
 The maths is written out here and not taken from cv2: `cv2.undistortPoints` stops 0.1 px short of
 the answer at image corners with its default criteria, and a call for one point costs more than
@@ -102,14 +103,6 @@ class CameraModel:
         return np.array(
             [[self.fx_px, 0.0, self.cx_px], [0.0, self.fy_px, self.cy_px], [0.0, 0.0, 1.0]]
         )
-
-    @property
-    def T_world_cam(self) -> Array:  # noqa: N802 - a transform names both ends
-        """The pose as a homogeneous matrix, (4, 4), camera to world."""
-        matrix = np.eye(4)
-        matrix[:3, :3] = self.R_world_cam
-        matrix[:3, 3] = self.t_world_cam_m
-        return matrix
 
     def scaled(self, width_px: int, height_px: int) -> CameraModel:
         """Return the same lens and pose read out at another resolution, cropped about the centre.

@@ -13,6 +13,8 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
+from hil.core.files import replace_file
+
 # Read by OpenCV's video backend when it opens its first file.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
@@ -119,12 +121,9 @@ def require_place(path: Path | None, suffixes: Collection[str] = ()) -> None:
 
 def write_atomic(path: Path, data: bytes) -> None:
     """Write a file beside its place and move it there; BadInput when the folder cannot be used."""
-    beside = path.with_name(f".{path.name}.part")
     try:
-        beside.write_bytes(data)
-        beside.replace(path)
+        replace_file(path, data)
     except OSError as error:
-        beside.unlink(missing_ok=True)
         raise BadInput(f"{path}: cannot be written: {error.strerror}") from None
 
 

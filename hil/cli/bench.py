@@ -9,10 +9,10 @@ from hil.cli.options import json_option, print_json
 
 @click.command("bench")
 @click.argument(
-    "what", type=click.Choice(["speed", "wheels", "vision", "firmware"]), default="speed"
+    "what", type=click.Choice(["speed", "parts", "wheels", "vision", "firmware"]), default="speed"
 )
 @click.option("--runs", type=click.IntRange(1, 100), default=5, show_default=True,
-              help="speed: counted runs of each figure, after one that is not counted; "
+              help="speed, parts: counted runs of each figure, after one that is not counted; "
               "wheels: robots drawn from 10 % around the believed one.")  # fmt: skip
 @click.option("--tune", "candidates", type=click.IntRange(11, 100_000), metavar="CANDIDATES",
               help="wheels: search the gains of both laws, that many candidates each.")  # fmt: skip
@@ -22,11 +22,12 @@ def command(what: str, runs: int, candidates: int | None, as_json: bool) -> None
 
     \b
     speed     medians of several runs, with least and largest
+    parts     what a tick's shares, a report and the viewer's file cost
     wheels    both wheel laws at step, ramp, crawl, turn, load, friction, battery sag
     vision    the colour marks on rendered sequences of known truth; some minutes
     firmware  what the sketch costs the Mega 2560: cycles by part, load, memory
     """  # noqa: D301 - \b is click's mark for a verbatim paragraph
-    if what == "speed" and candidates is not None:
+    if what in {"speed", "parts"} and candidates is not None:
         raise click.UsageError("--tune: the wheels have gains, the speed figures have none")
     if candidates is not None:
         _tune_wheels(candidates, as_json)
@@ -37,7 +38,7 @@ def command(what: str, runs: int, candidates: int | None, as_json: bool) -> None
     elif what == "firmware":
         _measure_firmware(as_json)
     else:
-        _measure_speed(runs, as_json)
+        _measure_speed(what, runs, as_json)
 
 
 def _measure_vision(as_json: bool) -> None:
@@ -77,10 +78,10 @@ def _measure_firmware(as_json: bool) -> None:
     Console().print(parts, table)
 
 
-def _measure_speed(runs: int, as_json: bool) -> None:
-    from hil.tools import bench
+def _measure_speed(what: str, runs: int, as_json: bool) -> None:
+    from hil.tools import bench, bench_parts
 
-    found = bench.figures(runs)
+    found = bench_parts.figures(runs) if what == "parts" else bench.figures(runs)
     if as_json:
         print_json(bench.as_document(found))
         return

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from hil.cli.ci import junit_file, junit_option, tell_ci
 from hil.cli.options import figures_option, json_option, print_json
 from hil.core.text import visible
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 @click.option("--rerun", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.rrd",
               help="Write all runs as one recording for the viewer, on a common timeline.")  # fmt: skip
 @figures_option
+@junit_option
 @json_option
 def command(
     runs: tuple[Path, ...],
@@ -30,6 +32,7 @@ def command(
     csv_file: Path | None,
     rerun: Path | None,
     figures: Path | None,
+    junit: Path | None,
     as_json: bool,
 ) -> int:
     """Compare two or more run records of one scenario.
@@ -45,7 +48,8 @@ def command(
     from hil.runs.execute import judged_status
     from hil.study.experiment import study
 
-    records = [read_run(run) for run in runs]
+    with junit_file(junit, "compare"):
+        records = [read_run(run) for run in runs]
     found = study(records)
     repeats = [found.repeats] if found.repeats else []
     with figures_kept(figures):
@@ -59,6 +63,7 @@ def command(
         from hil.record.rrd import write_rrd
 
         write_rrd(rerun, records)
+    tell_ci(records, "hil compare", junit=junit, report=report)
     if as_json:
         print_json(found.to_json())
         return judged_status(records)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from hil.cli.ci import junit_file, junit_option, tell_ci
 from hil.cli.compare import print_study
 from hil.cli.options import (
     INNER_LAWS,
@@ -35,6 +36,7 @@ from hil.core.text import visible
 @set_option
 @out_option
 @figures_option
+@junit_option
 @json_option
 def command(
     deck: str,
@@ -46,6 +48,7 @@ def command(
     overrides: tuple[str, ...],
     out: Path | None,
     figures: Path | None,
+    junit: Path | None,
     as_json: bool,
 ) -> int:
     """Run every scenario of DECK with both laws and write one report.
@@ -78,7 +81,7 @@ def command(
     folder = out or new_folder("experiment")
     specs = deck_specs(load_deck(deck), conditions, folder)
     warn_unfinished({spec.scenario.name: spec.scenario for spec in specs}.values())
-    with writing(folder):
+    with junit_file(junit, f"experiment.{deck}"), writing(folder):
         todo = claim(folder, specs, _say)
         if len(todo) < len(specs):
             _say(f"{len(specs) - len(todo)} of {len(specs)} runs are there already")
@@ -95,6 +98,7 @@ def command(
             circle=circle_study(),
             repeats=[item.repeats for item in studies if item.repeats],
         )
+    tell_ci(records, f"hil experiment {deck}", junit=junit, report=report)
     if as_json:
         print_json({"report": str(report), "comparisons": [item.to_json() for item in studies]})
     else:

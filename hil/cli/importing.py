@@ -18,7 +18,10 @@ from hil.core.text import visible
 @out_option
 @json_option
 def command(log: Path, mapping: Path | None, out: Path | None, as_json: bool) -> int:
-    """Make a run record of LOG, a MAVLink .tlog or a CSV file, that compare and view accept.
+    """Make a run record of LOG, a log of another program, that compare and view accept.
+
+    LOG is MAVLink telemetry (.tlog), DataFlash of ArduPilot (.bin), PX4's ULog (.ulg), MCAP (.mcap), or
+    CSV (any other ending).
 
     What was left out, repaired or assumed is said on stderr and kept in the record. Exit status 1
     when the log fails a requirement of its task.

@@ -25,7 +25,11 @@ COMMANDS = {
     ),
     "compare": ("hil.cli.compare", "Compare recorded runs: table, JSON and HTML report."),
     "replay": ("hil.cli.replay", "Replay a record exactly, or with another law as its shadow."),
-    "import": ("hil.cli.importing", "Make a record of a MAVLink .tlog or a CSV file."),
+    "import": (
+        "hil.cli.importing",
+        "Make a record of another program's log: .tlog .bin .ulg .mcap, CSV.",
+    ),
+    "export": ("hil.cli.export", "Write a record as MCAP (Foxglove), ULog (PX4) or CSV."),
     "view": ("hil.cli.view", "Open recorded runs in the viewer."),
     "sweep": ("hil.cli.sweep", "Run a campaign over grids, lists and distributions; draw maps."),
     "reproduce": (

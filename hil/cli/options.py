@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,9 +13,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from hil.config.scenario import Scenario
-
-Function = TypeVar("Function", bound=Callable[..., Any])
-
 INNER_LAWS = click.Choice(["pid", "asg-ism"])
 
 target_option = click.option(

@@ -113,7 +113,8 @@ def print_report(report: ReplayReport) -> None:
         console.print(f"note: {visible(problem)}")
     console.print(visible(headline(report)))
     if report.kind == "shadow":
-        console.print(visible("\n".join(shadow_lines(report))))
+        for line in shadow_lines(report):
+            console.print(visible(line))
         return
     different = [channel for channel in report.channels if not channel.same]
     if not different:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from hil.cli.ci import junit_file, junit_option, tell_ci
 from hil.cli.options import (
     camera_option,
     inner_option,
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     help="Show the robot to ground stations over UDP.  [without a value: 127.0.0.1:14550]",
 )  # fmt: skip
 @click.option("--view", is_flag=True, help="Open the record in the viewer afterwards.")
+@junit_option
 @json_option
 def command(
     scenario: str,
@@ -63,6 +65,7 @@ def command(
     small_video: bool,
     bridge: str | None,
     view: bool,
+    junit: Path | None,
     as_json: bool,
 ) -> int:
     """Run SCENARIO (a built-in name or a TOML file) and record it.
@@ -92,10 +95,12 @@ def command(
         command=command_line(),
     )
     with (
+        junit_file(junit, f"{resolved.name}.{law.name}"),
         run_progress({resolved.name: resolved.duration_s}) as update,
         _ground_stations(bridge) as publish,
     ):
         record = execute(spec, lambda t_s: update(resolved.name, t_s), publish=publish)
+    tell_ci([record], f"hil run {resolved.name}", junit=junit)
     if as_json:
         print_json(summary(record))
     else:

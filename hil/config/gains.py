@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
@@ -15,6 +14,7 @@ from pydantic import (
 )  # fmt: skip
 
 from hil.config.base import OpenSection, Section
+from hil.core.files import parse_toml
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import Entry, SourceText
 
@@ -112,4 +112,4 @@ def shipped_gains() -> dict[str, Any]:
 def read_gain_set(name: str) -> dict[str, Any]:
     """Return the tables of a gain file that ships with the package."""
     text = (files("hil") / "data" / "gains" / f"{name}.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)
+    return parse_toml(text, f"gains {name}")

@@ -8,6 +8,9 @@ from pydantic import model_validator
 
 from hil.config.base import Section, quantity, rounded_up
 
+# Both serial ports of the board: firmware_arduino/src/board/uart.h says the same (a test compares).
+UART_BAUD = 57_600
+
 
 class LinkConfig(Section):
     """Both directions alike; delay of one chunk is latency + jitter * u, u uniform in -1..1.
@@ -17,7 +20,12 @@ class LinkConfig(Section):
     """
 
     baud: int = quantity(
-        "bit/s", "10 bits a byte", 57_600, ge=1_200, le=2_000_000, source="the HC-05 of the thesis"
+        "bit/s",
+        "10 bits a byte",
+        UART_BAUD,
+        ge=1_200,
+        le=2_000_000,
+        source="the HC-05 of the thesis",
     )
     latency_s: float = quantity(
         "s", "mean delay of a chunk", 0.020, ge=0, le=2, source="assumed: serial Bluetooth"

@@ -6,7 +6,6 @@ Every refusal is one BadInput line that names file, key, value with its unit, an
 from __future__ import annotations
 
 import difflib
-import tomllib
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -20,6 +19,7 @@ from hil.config.limits import board_defaults, check_board
 from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
+from hil.core.files import parse_toml
 from hil.core.registry import is_file_name
 
 # Values that would be laid aside: the command's own option (in a campaign, its list) decides them.
@@ -89,10 +89,7 @@ def read_tree(name_or_path: str, kind: str, above: tuple[str, ...] = ()) -> Tree
         raise BadInput(f"{name_or_path}: lies on itself: {' on '.join((*above, name_or_path))}")
     above = (*above, name_or_path)
     text, where, folder = _read_text(name_or_path, kind)
-    try:
-        tree = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # a number or brackets beyond what Python takes
-        raise BadInput(f"{where}: not valid TOML: {error}") from None
+    tree = parse_toml(text, str(where))
     for part in ("robot", "camera"):
         if isinstance(tree.get(part), Mapping) and "file" in tree[part]:
             own = dict(tree[part])
@@ -231,11 +228,8 @@ def _is_index(part: str) -> bool:
 def parse_value(text: str) -> Any:
     """Return a TOML value, or the text itself where it is not one (so names need no quotes)."""
     try:
-        tree = tomllib.loads(f"value = {text}")
-    except (
-        ValueError,
-        RecursionError,
-    ):  # no TOML, or a number or brackets beyond what Python takes
+        tree = parse_toml(f"value = {text}", text)
+    except BadInput:
         return text.strip()
     # A line end in the text would begin another key.
     return tree["value"] if len(tree) == 1 else text.strip()

@@ -18,6 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from hil.core.errors import BadInput
+from hil.core.files import replacing
 from hil.record.schema import Column
 
 if TYPE_CHECKING:
@@ -73,9 +74,8 @@ def read_journal(path: Path) -> Columns:
 
 def write_parquet(path: Path, columns: Columns, schema: Sequence[Column]) -> None:
     """Write the table atomically; equal values give an equal file (no time or host inside)."""
-    part = path.with_name(f"{path.name}.part")
-    pq.write_table(arrow_table(columns, schema), part, compression="zstd", use_dictionary=False)
-    part.replace(path)
+    with replacing(path) as part:
+        pq.write_table(arrow_table(columns, schema), part, compression="zstd", use_dictionary=False)
 
 
 def arrow_table(columns: Columns, schema: Sequence[Column]) -> pa.Table:

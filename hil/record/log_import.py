@@ -1,4 +1,4 @@
-"""Logs of other programs made into run records: MAVLink telemetry logs, and CSV with a mapping.
+"""Logs of other programs made into run records: MAVLink telemetry, DataFlash, ULog, MCAP, CSV.
 
 A mapping (TOML) says what the run was and where each column of `samples.parquet` comes from:
 
@@ -9,7 +9,7 @@ A mapping (TOML) says what the run was and where each column of `samples.parquet
     est_x_m = { column = "X_mm", scale = 0.001 }
     est_theta_rad = { message = "ATTITUDE", field = "yaw", scale = -1.0, offset = 1.5707963 }
 
-Of a telemetry log, poses and commands of standard messages need no mapping. Columns nobody gives
+Poses and commands of standard messages of MAVLink, ArduPilot and PX4 need no mapping. Columns nobody gives
 stay empty, but for those that follow: speeds from the pose, delta1 from pose and reference, wheel
 commands from body commands. What was left out, repaired or assumed is said in notes, which are
 also events of the record.
@@ -17,6 +17,7 @@ also events of the record.
 
 from __future__ import annotations
 
+import importlib
 import math
 import time
 from dataclasses import dataclass
@@ -33,6 +34,7 @@ from hil.record.log_csv import read_csv
 from hil.record.log_mapping import LogMapping, read_mapping
 from hil.record.log_signals import Signals
 from hil.record.log_telemetry import read_tlog
+from hil.record.log_topics import signals_of
 from hil.record.manifest import Manifest, collect_versions, git_revision
 from hil.record.recorder import Recorder
 from hil.record.schema import SAMPLE_NAMES
@@ -40,10 +42,21 @@ from hil.record.schema import SAMPLE_NAMES
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
     from hil.record.log_signals import Array
+    from hil.record.log_topics import TopicLog
     from hil.record.reader import RunRecord
 
+# Ending of the name -> (module, reader), imported when one is read.
+_TOPIC_READERS = {
+    ".bin": ("hil.record.log_dataflash", "read_dataflash"),
+    ".ulg": ("hil.record.log_ulog", "read_ulog"),
+    ".ulog": ("hil.record.log_ulog", "read_ulog"),
+    ".mcap": ("hil.record.log_mcap", "read_mcap"),
+}
 # Faster than this no small wheeled robot drives: the rows are of two, or in another unit.
 _SPEED_BELIEVED_M_S = 5.0
+# A hole in the pose is told from this length on, where it is many times the usual step.
+_HOLE_S = 0.5
+_HOLE_STEPS = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +71,7 @@ def import_log(log: Path, mapping: Path | None, out: Path, command: str) -> Impo
     """Make a run record of a foreign log in the new folder `out`; raises BadInput."""
     settings = read_mapping(mapping)
     scenario = load_scenario(_beside(mapping, settings.scenario), settings.set)
-    signals = read_tlog(log, settings) if log.suffix.lower() == ".tlog" else read_csv(log, settings)
+    signals = read_log(log, settings)
     columns = _completed(signals, scenario)
     notes = (*signals.notes, *_doubts(columns), *_assumed(settings, scenario, columns["t_s"]))
     recorder = Recorder(out, _manifest(log, scenario, settings, command))
@@ -71,6 +84,18 @@ def import_log(log: Path, mapping: Path | None, out: Path, command: str) -> Impo
     for note in notes:
         recorder.event(0.0, "note", note)
     return Imported(recorder.close("complete", f"imported from {log.name}"), notes)
+
+
+def read_log(log: Path, settings: LogMapping) -> Signals:
+    """Return what a log says, by the reader of its name's ending; raises BadInput."""
+    suffix = log.suffix.lower()
+    if suffix == ".tlog":
+        return read_tlog(log, settings)
+    if suffix not in _TOPIC_READERS:
+        return read_csv(log, settings)
+    module, reader = _TOPIC_READERS[suffix]
+    found: TopicLog = getattr(importlib.import_module(module), reader)(log)
+    return signals_of(found, settings)
 
 
 def _assumed(settings: LogMapping, scenario: Scenario, t_s: Array) -> list[str]:
@@ -91,18 +116,28 @@ def _assumed(settings: LogMapping, scenario: Scenario, t_s: Array) -> list[str]:
 
 
 def _doubts(columns: dict[str, Array]) -> list[str]:
-    """Return a line when the pose jumps further than a robot drives."""
+    """Return a line when the pose jumps further than a robot drives, and one when it is long away."""
     t_s = columns["t_s"]
+    steps_s = np.diff(t_s)
     steps_m = np.hypot(np.diff(columns["est_x_m"]), np.diff(columns["est_y_m"]))
-    speeds_m_s = steps_m / np.diff(t_s)
+    speeds_m_s = steps_m / steps_s
+    notes = []
     fast = np.flatnonzero(speeds_m_s > _SPEED_BELIEVED_M_S)
-    if not fast.size:
-        return []
-    worst = int(np.argmax(speeds_m_s))
-    return [
-        f"the pose jumps {fast.size} times, at {t_s[worst]:.3f} s by {steps_m[worst]:.3g} m "
-        f"({speeds_m_s[worst]:.3g} m/s): two robots in one log, or another unit?"
-    ]
+    if fast.size:
+        worst = int(np.argmax(speeds_m_s))
+        notes.append(
+            f"the pose jumps {fast.size} times, at {t_s[worst]:.3f} s by {steps_m[worst]:.3g} m "
+            f"({speeds_m_s[worst]:.3g} m/s): two robots in one log, or another unit?"
+        )
+    away = np.flatnonzero(steps_s > max(_HOLE_S, _HOLE_STEPS * float(np.median(steps_s))))
+    if away.size:
+        longest = int(np.argmax(steps_s))
+        more = f"; {away.size} such holes of {steps_s[away].sum():.3g} s in all"
+        notes.append(
+            f"no pose for {steps_s[longest]:.3g} s from {t_s[longest]:.3g} s on"
+            + (more if away.size > 1 else "")
+        )
+    return notes
 
 
 def _beside(mapping: Path | None, name: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from pathlib import Path
 from typing import Literal
 
@@ -11,16 +10,17 @@ from pydantic import Field, ValidationError
 
 from hil.config.base import Section
 from hil.core.errors import BadInput
+from hil.core.files import read_toml
 from hil.record.schema import SAMPLE_NAMES
 
-Disorder = Literal["refuse", "cut", "sort"]
+Disorder = Literal["refuse", "cut", "sort", "skip"]
 
 
 class Source(Section):
     """Where a signal comes from; what is read is value * scale + offset in the column's unit."""
 
     column: str = ""
-    message: str = ""
+    message: str = Field("", description="or topic; NAME[1] is the second of several instances")
     field: str = Field("", description="of the message; name[2] is one element of an array")
     scale: float = 1.0
     offset: float = 0.0
@@ -46,7 +46,9 @@ class LogMapping(Section):
     )
     decimal: Literal["", ".", ","] = Field("", description="decimal mark; empty: as the file shows")
     disorder: Disorder = Field(
-        "refuse", description="where time falls back: refuse the log, cut it there, or sort it"
+        "refuse",
+        description="where time falls back: refuse the log, cut it there, sort it, or skip what is "
+        "behind; logs of messages (.bin, .ulg, .mcap) are skipped in where nothing is said",
     )
     t: Source = Source(column="t_s")
     columns: dict[str, Source] = Field(default_factory=dict)
@@ -75,12 +77,9 @@ def read_mapping(path: Path | None) -> LogMapping:
     """Return the mapping of a file, or the default one; raises BadInput."""
     if path is None:
         return LogMapping()
+    tree = read_toml(path, "mapping")
     try:
-        settings = LogMapping.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(f"mapping {path}: cannot be read: {error}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise BadInput(f"{path}: not valid TOML: {error}") from None
+        settings = LogMapping.model_validate(tree)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         key = ".".join(str(part) for part in first["loc"])

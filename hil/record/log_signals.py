@@ -86,6 +86,11 @@ def in_order(
         ordered: Places = places[np.argsort(t_s[places], kind="stable")]
         said = f"time falls back {falls} times: {what} sorted by their time"
         return ordered, [said] if falls else []
+    if disorder == "skip":
+        kept = places[ascending(t_s[places])]
+        left = places.size - kept.size
+        said = f"{left} of {places.size} {what} have a time before one already read: left out"
+        return kept, [said] if left else []
     stray = _strays(t_s[places])
     notes = []
     if 0 < stray.size <= max(1.0, _STRAY_SHARE * places.size):
@@ -104,6 +109,24 @@ def in_order(
     left = places.size - kept.size
     notes.append(f"time falls back: cut there, {left} of {places.size} {what} left out")
     return kept, notes
+
+
+def ascending(t_s: Array) -> Places:
+    """Return the places of the longest sequence of times of which none falls back."""
+    if not (np.diff(t_s) < 0.0).any():
+        return np.arange(t_s.size)
+    lasts: list[float] = []  # [k]: the least last time of a sequence of k + 1
+    at: list[int] = []
+    before = np.full(t_s.size, -1, dtype=np.intp)
+    for place, value in enumerate(t_s.tolist()):
+        length = bisect.bisect_right(lasts, value)
+        before[place] = at[length - 1] if length else -1
+        lasts[length : length + 1] = [value]
+        at[length : length + 1] = [place]
+    found = [at[-1]]
+    while before[found[-1]] >= 0:
+        found.append(int(before[found[-1]]))
+    return np.array(found[::-1], dtype=np.intp)
 
 
 def _strays(t_s: Array) -> Places:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-import os
 import platform
 import subprocess
 import sys
@@ -25,6 +24,7 @@ from pydantic import (
 )
 
 from hil.core.errors import BadInput
+from hil.core.files import replace_file
 from hil.core.registry import Entry
 from hil.record import layout
 from hil.record.schema import SCHEMA_VERSION
@@ -171,21 +171,6 @@ def read_manifest(folder: Path) -> Manifest:
         first = error.errors(include_url=False)[0]
         key = ".".join(str(part) for part in first["loc"])
         raise BadInput(f"{path}: damaged: {key}: {first['msg'].lower()}") from None
-
-
-def replace_file(path: Path, data: bytes, *, durable: bool = False) -> None:
-    """Put `data` at `path` in one step, so that no reader and no crash sees half of it.
-
-    With `durable` it has also reached the disk when this returns, and survives a loss of power.
-    That takes milliseconds, so a record asks for it once, at its very end.
-    """
-    part = path.with_name(f"{path.name}.part")
-    with part.open("wb") as file:
-        file.write(data)
-        if durable:
-            file.flush()
-            os.fsync(file.fileno())
-    part.replace(path)
 
 
 def file_entry(path: Path) -> FileEntry:

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 
 from hil.analysis import metrics
 from hil.core.errors import BadInput
+from hil.core.files import replace_file
 from hil.record import layout
 from hil.record.camera import CameraKeeper
 from hil.record.journal import Columns, Journal, read_journal, write_parquet
-from hil.record.manifest import Manifest, Outcome, Plugin, file_entry, replace_file, write_manifest
+from hil.record.manifest import Manifest, Outcome, Plugin, file_entry, write_manifest
 from hil.record.reader import RunRecord, read_events, read_pictures
 from hil.record.schema import FRAME_COLUMNS, FRAME_NAMES, SAMPLE_COLUMNS, SAMPLE_NAMES, Column
 from hil.record.tape import TapeWriter

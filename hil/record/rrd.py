@@ -18,6 +18,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from hil.analysis import metrics
+from hil.core.files import replacing
 from hil.core.registries import OUTER_LAWS
 from hil.record.reader import RunRecord
 
@@ -84,9 +85,13 @@ _MAIN_PLOTS = ("error", "sliding", "wheels", "latency")
 def write_rrd(path: Path, runs: Sequence[RunRecord]) -> None:
     """Write the runs to one Rerun file, atomically; the first run's name titles the recording."""
     names = entity_names(runs)
-    part = path.with_name(f"{path.name}.part")
+    with replacing(path) as part:
+        _write_all(part, runs, names)
+
+
+def _write_all(file: Path, runs: Sequence[RunRecord], names: Sequence[str]) -> None:
     recording = rr.RecordingStream(APPLICATION, recording_id=_recording_id(runs))
-    recording.save(part, default_blueprint=blueprint(runs, names))
+    recording.save(file, default_blueprint=blueprint(runs, names))
     recording.send_recording_name(" and ".join(names))
     one_scenario = len({run.manifest.scenario_name for run in runs}) == 1
     legends = [f"{name.rpartition('/')[2] if one_scenario else name} " for name in names]
@@ -96,7 +101,6 @@ def write_rrd(path: Path, runs: Sequence[RunRecord]) -> None:
         _Sender(recording, name, run, colour).send(_LineStyle(prefix, lines))
     recording.flush()
     recording.disconnect()
-    part.replace(path)
 
 
 def entity_names(runs: Sequence[RunRecord]) -> list[str]:

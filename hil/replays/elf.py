@@ -55,7 +55,8 @@ def elf() -> Firmware:
 
 def elf_pwm(elf: Path, frames: Sequence[Sent], ticks: Sequence[Tick]) -> Pwm:
     """Return the PWM (left, right) in counts that the ELF sets at each tick."""
-    from sim_twin.pil import UART_BAUD, pil_module  # noqa: PLC0415 - as above
+    from hil.config.link import UART_BAUD  # noqa: PLC0415 - as above
+    from sim_twin.pil import pil_module  # noqa: PLC0415 - as above
 
     board = pil_module()(str(elf), "1", 0.0, b"")
     board.power_up()

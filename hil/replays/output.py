@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hil.core.errors import BadInput
+from hil.core.files import replace_file
 from hil.record.journal import write_parquet
-from hil.record.manifest import replace_file
 from hil.record.schema import SAMPLE_COLUMNS
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from hil.core.errors import BadInput
 from hil.core.figures import METRICS
-from hil.record.manifest import replace_file
+from hil.core.files import replace_file
 
 if TYPE_CHECKING:
     from hil.record.reader import RunRecord

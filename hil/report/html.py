@@ -15,7 +15,7 @@ from markupsafe import Markup
 
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME, METRICS
-from hil.record.manifest import replace_file
+from hil.core.files import replace_file
 from hil.report import figures as draw
 from hil.report.assumptions import Assumption, assumptions, gain_assumptions
 from hil.report.compare import HEADLINES, Comparison, Entry, best_entry, findings

@@ -18,7 +18,7 @@ import matplotlib as mpl
 import numpy as np
 
 from hil.core.errors import BadInput
-from hil.record.manifest import replace_file
+from hil.core.files import replace_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,6 +12,7 @@ import time
 
 import serial
 
+from hil.config.link import UART_BAUD
 from hil.core.errors import BadInput, RigFault
 from hil.core.rig import PORT_BYTES, ByteStream, Frame, LineBacklog, Truth
 from hil.rigs.frames import FrameSource
@@ -21,7 +22,6 @@ try:
 except ImportError:  # Windows has none
     termios_error = OSError  # type: ignore[misc,assignment]
 
-DEFAULT_BAUD = 57_600
 # Where select cannot wait for a port (Windows), it is looked at this often.
 _POLL_S = 0.001
 
@@ -30,9 +30,11 @@ def parse_target(text: str) -> tuple[str, int]:
     """Return device and baud rate of `serial:DEV[@BAUD]`; raises BadInput."""
     device, at, baud_text = text.removeprefix("serial:").rpartition("@")
     if not at:
-        device, baud_text = baud_text, str(DEFAULT_BAUD)
+        device, baud_text = baud_text, str(UART_BAUD)
     if not device:
-        raise BadInput(f"target {text!r}: names no port; for example serial:/dev/ttyUSB0@57600")
+        raise BadInput(
+            f"target {text!r}: names no port; for example serial:/dev/ttyUSB0@{UART_BAUD}"
+        )
     if not baud_text.isdigit() or not 1_200 <= int(baud_text) <= 2_000_000:
         raise BadInput(f"target {text!r}: baud rate {baud_text!r} is not in 1200 to 2000000 bit/s")
     return device, int(baud_text)

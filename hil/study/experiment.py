@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 from hil.config.fit import check_fit
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput
-from hil.record.manifest import Manifest, replace_file
+from hil.core.files import replace_file
+from hil.record.manifest import Manifest
 from hil.report.circle import CircleStudy
 from hil.report.compare import compare_runs, refuse_other_task, to_json
 from hil.report.repeats import Repeats, repeats_of

@@ -20,7 +20,7 @@ from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
 from hil.config.sources import built_in_settings
 from hil.core.errors import BadInput
-from hil.record.manifest import replace_file
+from hil.core.files import replace_file
 from hil.study.campaign.plan import CampaignFile
 
 

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from hil.config.control import PointReference
 from hil.config.events import Disturbance
 from hil.config.load import load_robot, load_scenario
+from hil.core.files import replace_file
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import Box
 from hil.core.types import wrap_pi
-from hil.record.manifest import replace_file
 
 if TYPE_CHECKING:
     from hil.config.gains import Gains

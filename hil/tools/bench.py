@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from hil.config.link import UART_BAUD
 from hil.config.load import load_scenario
 from hil.rigs.opening import open_rig
 from hil.runs.execute import RunSpec, execute
@@ -71,7 +72,7 @@ def kernel_step_us() -> float:
 
     from sim_twin.setup import STEP_US, make_kernel  # noqa: PLC0415
 
-    kernel = make_kernel(load_scenario(_SCENARIO).robot, 57_600, Random(1))
+    kernel = make_kernel(load_scenario(_SCENARIO).robot, UART_BAUD, Random(1))
     steps = 50_000
     start_s = time.perf_counter()
     end_us = steps * STEP_US

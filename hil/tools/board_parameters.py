@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,7 +9,7 @@ from pathlib import Path
 
 from hil.config.limits import check_board, check_edges
 from hil.core.errors import BadInput
-from hil.record.manifest import replace_file
+from hil.core.files import read_toml, replace_file
 from hil.rigs.serial import SerialRig, parse_target
 from hil.wire import handshake
 from hil.wire.link import BoardLink
@@ -70,10 +69,7 @@ def write_file(path: Path, parameters: Mapping[str, float]) -> None:
 
 def read_file(path: Path) -> dict[str, float]:
     """Return the [board] table of a file; raises BadInput."""
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8")).get("board")
-    except (OSError, ValueError, RecursionError) as error:
-        raise BadInput(f"{path}: not a readable parameter file: {error}") from None
+    table = read_toml(path, "parameter file").get("board")
     if not isinstance(table, dict) or not all(
         isinstance(value, int | float) for value in table.values()
     ):

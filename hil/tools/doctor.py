@@ -15,7 +15,6 @@ import re
 import shutil
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from importlib import metadata
@@ -24,6 +23,8 @@ from typing import Any, Literal
 
 from rich.markup import escape
 from rich.table import Table
+
+from hil.core.files import read_toml
 
 State = Literal["ok", "missing", "note"]
 
@@ -101,7 +102,7 @@ def _requirements() -> list[str]:
     try:
         lines = metadata.requires(_DISTRIBUTION) or []
     except metadata.PackageNotFoundError:
-        project = tomllib.loads((_SOURCE_ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+        project = read_toml(_SOURCE_ROOT / "pyproject.toml")
         lines = project["project"]["dependencies"]
     return [line for line in lines if "extra ==" not in line]
 

@@ -92,7 +92,6 @@ class BoardLink:
         self.clock = BoardClock()
         self.counters = self._reader.counters
         self.frames_sent = 0
-        self.last_frame_s = -math.inf
         self.heartbeats = 0
         self.state = dialect.HIL_STATE_DISARMED
         self.reason = dialect.HIL_REASON_NONE
@@ -196,7 +195,6 @@ class BoardLink:
                 handler = self._handlers.get(msg_id)
                 if handler is not None:
                     handler(message)
-            self.last_frame_s = t_s
         return reports
 
     def _on_wheel_state(self, wire: Any) -> WheelReport:

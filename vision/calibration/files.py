@@ -8,7 +8,6 @@ are, comments included. How good a calibration was stands as comments in its tab
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from pathlib import Path
 from hil.config.camera import CameraConfig
 from hil.config.load import build
 from hil.core.errors import BadInput
+from hil.core.files import parse_toml
 from vision.calibration.colours import ColourCalibration
 from vision.calibration.floor import FloorCalibration
 from vision.calibration.intrinsics import LensCalibration
@@ -71,11 +71,7 @@ def _read_text(path: Path) -> str:
 
 
 def _parse(text: str, path: Path) -> CameraConfig:
-    try:
-        tree = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise BadInput(f"{path}: not valid TOML: {error}") from None
-    return build(CameraConfig, tree, str(path))
+    return build(CameraConfig, parse_toml(text, str(path)), str(path))
 
 
 def update_camera(path: Path, tables: Sequence[Table]) -> CameraConfig:

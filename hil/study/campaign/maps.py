@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hil.record.manifest import replace_file
+from hil.core.files import replace_file
 from hil.report import figures as draw
 from hil.study.campaign.findings import Outcomes, sentences, short
 from hil.study.campaign.plan import HOLDS, metric_of

@@ -23,7 +23,8 @@ import pyarrow.parquet as pq
 from hil import __version__
 from hil.core.errors import BadInput, RigFault
 from hil.core.figures import METRICS
-from hil.record.manifest import git_revision, replace_file
+from hil.core.files import replace_file, replacing
+from hil.record.manifest import git_revision
 from hil.study.campaign.plan import Campaign, Job
 from hil.study.work_folder import LOCK, SET_ASIDE, is_new, set_aside
 
@@ -213,10 +214,9 @@ def _programs_on_disk(path: Path) -> list[str]:
 
 
 def _write(path: Path, table: pa.Table) -> None:
-    part = path.with_name(f"{path.name}.part")
     try:
-        pq.write_table(table, part, compression="zstd", write_page_checksum=True)
-        part.replace(path)
+        with replacing(path) as part:
+            pq.write_table(table, part, compression="zstd", write_page_checksum=True)
     except OSError as error:
         raise RigFault(
             f"{path}: cannot be written: {error.strerror or error}; the rows before are kept, the "

@@ -14,7 +14,7 @@ import jinja2
 from markupsafe import Markup
 
 from hil.core.errors import BadInput
-from hil.record.manifest import replace_file
+from hil.core.files import replace_file
 from hil.study.chapters.claims import shown
 from hil.study.chapters.draw import figure_svg
 from hil.study.chapters.reproduction import Section

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from hil.core.errors import BadInput
-from hil.record.manifest import replace_file
+from hil.core.files import replace_file
 from hil.tools.bringup.result import Measured, Pair
 from hil.tools.bringup.verdicts import COUNTS_ERROR_MAX
 

@@ -1,0 +1,63 @@
+"""Files put in place whole, and TOML read with one line of what is wrong: the one place for both."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from hil.core.errors import BadInput
+
+
+def replace_file(path: Path, data: bytes, *, durable: bool = False) -> None:
+    """Put `data` at `path` in one step, so that no reader and no crash sees half of it.
+
+    With `durable` it has also reached the disk when this returns, and survives a loss of power.
+    That takes milliseconds, so a record asks for it once, at its very end. Raises OSError.
+    """
+    with replacing(path) as part, part.open("wb") as file:
+        file.write(data)
+        if durable:
+            file.flush()
+            os.fsync(file.fileno())
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a name beside `path` to write to; the file takes the place of `path` when all went well.
+
+    After an error the half-written file is gone and `path` is as it was. Raises OSError.
+    """
+    part = path.with_name(f"{path.name}.part")
+    try:
+        yield part
+        part.replace(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def read_toml(path: Path, what: str = "") -> dict[str, Any]:
+    """Return the table of a TOML file.
+
+    `what` says what the file is, for example "mapping". Raises BadInput with one line when it
+    cannot be read, is no UTF-8 or no TOML.
+    """
+    name = f"{what} {path}".strip()
+    try:
+        return parse_toml(path.read_text(encoding="utf-8"), str(path))
+    except OSError as error:
+        raise BadInput(f"{name}: cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError as error:
+        raise BadInput(f"{name}: cannot be read: {error}") from None
+
+
+def parse_toml(text: str, name: str) -> dict[str, Any]:
+    """Return the table that TOML `text` says; raises BadInput, which names `name`."""
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # a number or brackets beyond what Python takes
+        raise BadInput(f"{name}: not valid TOML: {error}") from None
