@@ -23,6 +23,11 @@ _NAMES = {
     "BadInput": ("hil.core.errors", "BadInput"),
     "RigFault": ("hil.core.errors", "RigFault"),
     "Section": ("hil.config.base", "Section"),
+    "quantity": ("hil.config.base", "quantity"),
+    "check_estimator": ("hil.tools.conformance", "check_estimator"),
+    "check_law": ("hil.tools.conformance", "check_law"),
+    "check_localiser": ("hil.tools.conformance", "check_localiser"),
+    "check_robot": ("hil.tools.conformance", "check_robot"),
     "Scenario": ("hil.config.scenario", "Scenario"),
     "OuterLimits": ("hil.config.control", "OuterLimits"),
     "ReferenceConfig": ("hil.config.control", "ReferenceConfig"),
@@ -51,14 +56,20 @@ __all__ = [
     "Section",
     "WheelSample",
     "__version__",
+    "check_estimator",
+    "check_law",
+    "check_localiser",
+    "check_robot",
     "estimator",
     "localiser",
     "outer_law",
+    "quantity",
     "reference",
 ]
 
 if TYPE_CHECKING:
     from hil.config.base import Section as Section
+    from hil.config.base import quantity as quantity
     from hil.config.control import OuterLimits as OuterLimits
     from hil.config.control import ReferenceConfig as ReferenceConfig
     from hil.config.scenario import Scenario as Scenario
@@ -73,6 +84,10 @@ if TYPE_CHECKING:
     from hil.core.types import PoseMeasurement as PoseMeasurement
     from hil.core.types import ReferenceState as ReferenceState
     from hil.core.types import WheelSample as WheelSample
+    from hil.tools.conformance import check_estimator as check_estimator
+    from hil.tools.conformance import check_law as check_law
+    from hil.tools.conformance import check_localiser as check_localiser
+    from hil.tools.conformance import check_robot as check_robot
 
     outer_law = OUTER_LAWS.register
     estimator = ESTIMATORS.register

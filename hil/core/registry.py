@@ -27,6 +27,8 @@ from hil.core.errors import BadInput
 Thing = TypeVar("Thing", bound=Callable[..., Any])
 # name -> (least, start, largest) of what a search may vary, on a logarithmic scale
 Box = Mapping[str, tuple[float, float, float]]
+# name -> (unit, meaning) of a term that a law gives in its trace and the record keeps
+Terms = Mapping[str, tuple[str, str]]
 
 BUILT_IN = "built in"
 
@@ -58,6 +60,11 @@ class Entry:
     origin: str = BUILT_IN
     source: SourceText | None = None
     extra: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def trace(self) -> Terms:
+        """Return the terms of its own that a law declared with `trace=`; raises BadInput."""
+        return declared_terms(self)
 
     @property
     def key(self) -> str:
@@ -266,6 +273,25 @@ class Registry:
                 f"({', '.join(entry.name for entry in found)}); name one: {source.path.name}:NAME"
             )
         return found[0]
+
+
+def declared_terms(entry: Entry) -> Terms:
+    """Return `trace=` of a registration as it must be: name -> (unit, meaning); raises BadInput."""
+    given = entry.extra.get("trace", {})
+    rows = list(given.items()) if isinstance(given, Mapping) else [("", None)]
+    for name, said in rows:
+        parts = said if isinstance(said, tuple | list) else ()
+        if not (
+            isinstance(name, str)
+            and name.isidentifier()
+            and len(parts) == 2
+            and all(isinstance(part, str) for part in parts)
+        ):
+            raise BadInput(
+                f"{entry.name} ({entry.origin}): trace = {{{name!r}: {said!r}}}: needs names with "
+                'unit and meaning, for example {"offset_m": ("m", "offset from the line, left")}'
+            )
+    return {name: (said[0], said[1]) for name, said in rows}
 
 
 def is_file_name(name: str) -> bool:

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError
 from hil.core.errors import BadInput
 from hil.core.registry import Entry
 from hil.record import layout
-from hil.record.schema import SCHEMA_VERSION
+from hil.record.schema import SAMPLE_COLUMNS, SCHEMA_VERSION, Column
 
 Outcome = Literal["running", "complete", "interrupted", "fault"]
 _PACKAGES = ("skid-steer-hil", "numpy", "opencv-python-headless", "pymavlink", "pyarrow", "scipy")
@@ -64,6 +64,16 @@ class Plugin(BaseModel):
         return self._text
 
 
+class TraceTerm(BaseModel):
+    """A column of samples.parquet that the law itself brought along."""
+
+    model_config = ConfigDict(frozen=True)
+
+    name: str
+    unit: str
+    meaning: str
+
+
 class Manifest(BaseModel):
     """Everything that decides a run's result, and how the run ended.
 
@@ -84,6 +94,9 @@ class Manifest(BaseModel):
     inner: str
     gains: dict[str, Any] = Field(default_factory=dict, description="gains of the laws in use")
     plugins: list[Plugin] = Field(default_factory=list, description="what ran from outside")
+    trace: list[TraceTerm] = Field(
+        default_factory=list, description="the law's own columns, after those of every record"
+    )
     versions: dict[str, str] = Field(default_factory=dict)
     git_revision: str = ""
     dialect_hash: str = ""
@@ -107,6 +120,17 @@ class Manifest(BaseModel):
     def scenario_name(self) -> str:
         """Return the scenario's own name."""
         return str(self.scenario.get("name", ""))
+
+    @property
+    def sample_columns(self) -> tuple[Column, ...]:
+        """Return the columns of samples.parquet: those of every record, then the law's own."""
+        own = (Column(t.name, t.unit, "law", t.meaning, trace_key=t.name) for t in self.trace)
+        return (*SAMPLE_COLUMNS, *own)
+
+    @property
+    def sample_names(self) -> tuple[str, ...]:
+        """Return the names of `sample_columns`."""
+        return tuple(column.name for column in self.sample_columns)
 
 
 def write_manifest(folder: Path, manifest: Manifest, *, durable: bool = False) -> None:

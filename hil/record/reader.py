@@ -14,7 +14,7 @@ from hil.core.errors import BadInput
 from hil.record import layout
 from hil.record.journal import Columns, read_journal, read_parquet
 from hil.record.manifest import Manifest, file_entry, read_manifest
-from hil.record.schema import FRAME_NAMES, SAMPLE_NAMES
+from hil.record.schema import FRAME_NAMES
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +106,7 @@ def read_run(path: Path) -> RunRecord:
         problems.append("cut off in mid-run: the record was never closed")
     problems += altered_files(path, manifest)
     samples = read_table(path, layout.SAMPLES, layout.SAMPLES_JOURNAL, required=True)
-    missing = [name for name in SAMPLE_NAMES if name not in samples]
+    missing = [name for name in manifest.sample_names if name not in samples]
     if missing:
         raise BadInput(f"{path / layout.SAMPLES}: damaged: column {missing[0]} is missing")
     frames = read_table(path, layout.FRAMES, layout.FRAMES_JOURNAL, required=False)

@@ -24,9 +24,10 @@ from hil.control.task_notes import notes
 from hil.core.clocks import CameraClock
 from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES
 from hil.core.registry import BUILT_IN
-from hil.record.manifest import Manifest, Plugin, collect_versions, git_revision
+from hil.record.manifest import Manifest, Plugin, TraceTerm, collect_versions, git_revision
 from hil.record.memory import MemoryRecorder
 from hil.record.recorder import Recorder
+from hil.record.schema import own_columns
 from hil.record.tape import TapedRig
 from hil.record.timeline import Timeline
 from hil.rigs.opening import REPLAY, SIMULATED, open_rig
@@ -38,6 +39,7 @@ from hil.wire.link import BoardLink
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
+    from hil.core.registry import Entry
     from hil.core.rig import Rig
     from hil.core.types import OuterLaw
     from hil.record.memory import RunSink
@@ -207,6 +209,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
         geometry=geometry,
         recorder=recorder,
         timeline=timeline,
+        own_terms=tuple(OUTER_LAWS.get(spec.outer).trace),
     )
 
 
@@ -229,6 +232,7 @@ def make_manifest(spec: RunSpec) -> Manifest:
             "board": board_parameters(spec.scenario, spec.inner),
         },
         plugins=plugins_of(spec),
+        trace=trace_terms(law),
         open_loop_of=spec.target.removeprefix(REPLAY) if spec.target.startswith(REPLAY) else "",
         notes=notes(spec.scenario),
         versions=collect_versions(),
@@ -236,6 +240,14 @@ def make_manifest(spec: RunSpec) -> Manifest:
         start_time_utc=datetime.fromtimestamp(now_us * 1e-6, UTC).isoformat(timespec="seconds"),
         start_unix_us=now_us,
     )
+
+
+def trace_terms(law: Entry) -> list[TraceTerm]:
+    """Return the columns that a law brings along, for a manifest; raises BadInput."""
+    return [
+        TraceTerm(name=column.name, unit=column.unit, meaning=column.meaning)
+        for column in own_columns(law)
+    ]
 
 
 def _unix_us() -> int:

@@ -12,10 +12,12 @@ import math
 import signal
 import threading
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
 
 from hil.core.errors import HilError, RigFault
 from hil.core.registry import in_one_line
@@ -59,7 +61,16 @@ class GuardedLaw:
         self._check(
             "theta_dot_rad_s", command.theta_dot_rad_s, self._limits.theta_dot_max_rad_s, "rad/s"
         )
+        self._check_trace(command.trace)
         return command
+
+    def _check_trace(self, trace: object) -> None:
+        """Refuse a trace that the record could not hold; NaN stands for "does not exist"."""
+        if not isinstance(trace, Mapping):
+            raise self._fault(f"step returned a trace that is {type(trace).__name__}, not a dict")
+        for name, value in trace.items():
+            if not isinstance(value, int | float | np.number | np.bool_):
+                raise self._fault(f"step returned trace[{name!r}] = {value!r}, not a number")
 
     def _check(self, name: str, value: float, limit: float, unit: str) -> None:
         try:

@@ -58,6 +58,7 @@ class Parts:
     geometry: BelievedGeometry
     recorder: RunSink
     timeline: Timeline
+    own_terms: tuple[str, ...] = ()  # of the law's trace, kept in columns of their own
 
 
 @dataclass(frozen=True, slots=True)
@@ -363,6 +364,7 @@ class Session:
                 ),
                 link=link,
                 late=late,
+                own_terms=parts.own_terms,
             )
         )
         self._pose_time_recorded_s = self._pose_time_s
