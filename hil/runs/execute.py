@@ -36,6 +36,7 @@ from hil.runs.law_guard import GuardedLaw
 from hil.runs.session import Parts, Progress, Publish, Session
 from hil.wire.identity import board_hashes
 from hil.wire.link import BoardLink
+from vision.localisers.making import make_localiser
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
@@ -137,14 +138,17 @@ def execute(
         rig.close()
 
 
-def execute_in_memory(spec: RunSpec, rig: Rig | None = None) -> RunRecord:
+def execute_in_memory(
+    spec: RunSpec, rig: Rig | None = None, law: OuterLaw | None = None
+) -> RunRecord:
     """Run the spec and return what a record would hold, without writing one (spec.out is unused).
 
-    `rig` is another one than the spec's target names; it is closed here.
+    `rig` is another one than the spec's target names; it is closed here. `law` is another one than a
+    new one of the spec.
     """
     check_fit(spec.scenario)
     parameters = board_parameters(spec.scenario, spec.inner)
-    law = make_law(spec)
+    law = law or make_law(spec)
     rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
     try:
         recorder = MemoryRecorder(make_manifest(spec))
@@ -202,8 +206,8 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
         rig=rig,
         link=BoardLink(rig.stream, timeline.link_frame),
         camera_clock=CameraClock(scenario.camera.latency_s),
-        localiser=LOCALISERS.get(scenario.camera.localiser).factory(scenario.camera),
-        estimator=make_estimator(control.estimator, control.fusion, geometry),
+        localiser=make_localiser(scenario.camera),
+        estimator=make_estimator(control.estimator, control, geometry),
         law=WithinWheelSpeed(law or make_law(spec), geometry, wheel_speed_max_rad_s(scenario)),
         reference=make_reference(scenario.reference),
         geometry=geometry,

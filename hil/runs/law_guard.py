@@ -36,8 +36,8 @@ STEP_MAX_S = 0.2
 _EXCESS = 1.0 + 1e-9
 
 
-class _TooLongError(Exception):
-    """The law's time is up."""
+class TooLongError(Exception):
+    """The time of a call is up."""
 
 
 class GuardedLaw:
@@ -86,11 +86,11 @@ class GuardedLaw:
 
     def _call(self, what: str, function: Callable[[], Result]) -> Result:
         try:
-            with _time_limit(STEP_MAX_S):
+            with time_limit(STEP_MAX_S):
                 return function()
         except HilError:
             raise
-        except _TooLongError as error:
+        except TooLongError as error:
             raise self._fault(f"{what} took longer than {STEP_MAX_S:g} s", error) from None
         except Exception as error:
             raise self._fault(f"{what} raised {in_one_line(error)}", error) from None
@@ -107,8 +107,8 @@ class GuardedLaw:
 
 
 @contextmanager
-def _time_limit(seconds: float) -> Iterator[None]:
-    """Raise _TooLongError in the body after `seconds`, where the system can (main thread, not Windows)."""
+def time_limit(seconds: float) -> Iterator[None]:
+    """Raise TooLongError in the body after `seconds`, where the system can (main thread, not Windows)."""
     if (
         not hasattr(signal, "setitimer")
         or threading.current_thread() is not threading.main_thread()
@@ -117,7 +117,7 @@ def _time_limit(seconds: float) -> Iterator[None]:
         return
 
     def ring(_number: int, _frame: FrameType | None) -> None:
-        raise _TooLongError
+        raise TooLongError
 
     before = signal.signal(signal.SIGALRM, ring)
     signal.setitimer(signal.ITIMER_REAL, seconds)
