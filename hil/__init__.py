@@ -29,6 +29,10 @@ _NAMES = {
     "check_localiser": ("hil.tools.conformance", "check_localiser"),
     "check_robot": ("hil.tools.conformance", "check_robot"),
     "Scenario": ("hil.config.scenario", "Scenario"),
+    "BelievedGeometry": ("hil.control.estimators.geometry", "BelievedGeometry"),
+    "CameraConfig": ("hil.config.camera", "CameraConfig"),
+    "EstimatorConfig": ("hil.config.control", "EstimatorConfig"),
+    "camera_model": ("vision.camera_setup", "camera_model"),
     "OuterLimits": ("hil.config.control", "OuterLimits"),
     "ReferenceConfig": ("hil.config.control", "ReferenceConfig"),
 }
@@ -42,8 +46,11 @@ _DECORATORS = {
 
 __all__ = [
     "BadInput",
+    "BelievedGeometry",
+    "CameraConfig",
     "Estimate",
     "Estimator",
+    "EstimatorConfig",
     "OuterCommand",
     "OuterLaw",
     "OuterLimits",
@@ -56,6 +63,7 @@ __all__ = [
     "Section",
     "WheelSample",
     "__version__",
+    "camera_model",
     "check_estimator",
     "check_law",
     "check_localiser",
@@ -70,9 +78,12 @@ __all__ = [
 if TYPE_CHECKING:
     from hil.config.base import Section as Section
     from hil.config.base import quantity as quantity
+    from hil.config.camera import CameraConfig as CameraConfig
+    from hil.config.control import EstimatorConfig as EstimatorConfig
     from hil.config.control import OuterLimits as OuterLimits
     from hil.config.control import ReferenceConfig as ReferenceConfig
     from hil.config.scenario import Scenario as Scenario
+    from hil.control.estimators.geometry import BelievedGeometry as BelievedGeometry
     from hil.core.errors import BadInput as BadInput
     from hil.core.errors import RigFault as RigFault
     from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES
@@ -88,6 +99,7 @@ if TYPE_CHECKING:
     from hil.tools.conformance import check_law as check_law
     from hil.tools.conformance import check_localiser as check_localiser
     from hil.tools.conformance import check_robot as check_robot
+    from vision.camera_setup import camera_model as camera_model
 
     outer_law = OUTER_LAWS.register
     estimator = ESTIMATORS.register

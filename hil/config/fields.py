@@ -157,7 +157,7 @@ def told(model: type[BaseModel], key: str, tree: Any) -> Told:
         table = tree
         for part in parts[:2]:
             table = _child(table, part)
-        return told(own[0], own[1], table)  # type: ignore[arg-type]
+        return told(own[0], own[1], table)
     section: type[BaseModel] | None = model
     field: FieldInfo | None = None
     owner, name, table = section, "", tree

@@ -67,7 +67,9 @@ def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
         return scenario
     tree = scenario.model_dump(mode="json")
     # A name first: which settings there are depends on it.
-    for text in sorted(overrides, key=lambda text: text.partition("=")[0].strip() not in BY_NAME_KEY):
+    for text in sorted(
+        overrides, key=lambda text: text.partition("=")[0].strip() not in BY_NAME_KEY
+    ):
         set_value(tree, text)
     _fill_board(tree)
     changed = build(Scenario, tree, "--set")

@@ -52,7 +52,8 @@ def validated(place: Place, table: Any, info: ValidationInfo) -> BaseModel:
         table = table.model_dump()
     model = place.registry.get(name).settings
     if model is not None:
-        return model.model_validate(table)
+        own: BaseModel = model.model_validate(table)
+        return own
     if table:
         keys = ", ".join(map(str, table)) if isinstance(table, Mapping) else repr(table)
         raise ValueError(

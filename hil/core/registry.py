@@ -291,7 +291,7 @@ def declared_terms(entry: Entry) -> Terms:
                 f"{entry.name} ({entry.origin}): trace = {{{name!r}: {said!r}}}: needs names with "
                 'unit and meaning, for example {"offset_m": ("m", "offset from the line, left")}'
             )
-    return {name: (said[0], said[1]) for name, said in rows}
+    return {name: (str(said[0]), str(said[1])) for name, said in rows if said is not None}
 
 
 def is_file_name(name: str) -> bool:

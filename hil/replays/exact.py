@@ -121,9 +121,7 @@ def replay(
     )  # fmt: skip
     # A shadow's rows have the columns of its own law.
     terms = trace_terms(OUTER_LAWS.get(law))
-    recorder = MemoryRecorder(
-        source.manifest.model_copy(update={"trace": terms}), keep_link=True
-    )
+    recorder = MemoryRecorder(source.manifest.model_copy(update={"trace": terms}), keep_link=True)
     rig = open_replay(source, recorded)
     parts = make_parts(spec, rig, recorder)
     shadow = Shadow(parts.law, source.samples) if kind == "shadow" else None

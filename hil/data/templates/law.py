@@ -1,9 +1,9 @@
 """An outer law of your own: what the robot shall do next, from where it is and where it should be.
 
-    hil run scenario-1 --outer ./my-law.py
-    hil check law my-law.py
-    hil tune --outer ./my-law.py
-    hil experiment --outer ./my-law.py --outer pid --outer asg-ism
+    hil run scenario-1 --outer ./my-thing.py
+    hil check law my-thing.py
+    hil tune --outer ./my-thing.py
+    hil experiment --outer ./my-thing.py --outer pid --outer asg-ism
 
 World frame: X right and Y up on the floor; theta counter-clockwise from +X; SI units and radians.
 """
@@ -14,20 +14,20 @@ import hil
 
 
 class Gains(hil.Section):
-    """What may be set with --set control.gains.tuned.my_law.KEY=VALUE, and is tuned."""
+    """What may be set with --set control.gains.tuned.my_thing.KEY=VALUE, and is tuned."""
 
     speed_s: float = hil.quantity("1/s", "speed per distance to the point", 1.0, gt=0, le=20)
     turn_rad_s: float = hil.quantity("rad/s", "turn rate when it lies abeam", 2.0, gt=0, le=20)
 
 
 @hil.outer_law(
-    "my-law",
+    "my-thing",
     settings=Gains,
     search={"speed_s": (0.2, 1.0, 5.0), "turn_rad_s": (0.5, 2.0, 10.0)},
     colour="#009e73",
     trace={"abeam_m_s": ("m/s", "wanted speed across the heading, left positive")},
 )
-class MyLaw:
+class MyThing:
     """Drives towards the point and turns its nose to it; one instance runs one robot."""
 
     def __init__(self, gains: Gains, limits: hil.OuterLimits, d0_m: float) -> None:  # noqa: ARG002

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,12 @@ TIGHT = {"eta1_max_m_s": 0.1, "theta_dot_max_rad_s": 0.4}
 REPEATED_S = 6.0
 _FEW_TICKS = 8
 
-Make = Callable[[], OuterLaw]
+# The checks, in their order, after the one of the step time.
+ON_THE_FLOOR = (
+    "finite", "keeps to limits", "trace declared", "deterministic", "reset equals new",
+    "no state shared", "no clock", "no unseeded random number", "mirror symmetry",
+)  # fmt: skip
+ON_THE_TWIN = ("scenario holds", "against itself", "negative control")
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +70,7 @@ class Bench:
         return 1.0 / self.scenario.control.rate_hz
 
 
-def check_law(
-    law: Named, *, scenario: str = SCENARIO, overrides: Sequence[str] = ()
-) -> Report:
+def check_law(law: Named, *, scenario: str = SCENARIO, overrides: Sequence[str] = ()) -> Report:
     """Return the report on a law that keeps every rule of the kit.
 
     `law` is a name, a file or the registered class; `overrides` are KEY=VALUE texts as for --set.
@@ -82,37 +86,37 @@ def law_report(law: Named, *, scenario: str = SCENARIO, overrides: Sequence[str]
         resolved = load_scenario(scenario, overrides)
         checks = Checks("law", entry.name, entry.origin)
         bench = Bench(entry, resolved, episodes(resolved, _FEW_TICKS))
-        if checks.run("step time", lambda: _step_time(bench)):
-            bench = Bench(entry, resolved, episodes(resolved))
+        if not checks.run("step time", lambda: _step_time(bench)):
+            checks.leave_out((*ON_THE_FLOOR, *ON_THE_TWIN), "it must take its steps in time first")
+            return checks.report()
+        bench = Bench(entry, resolved, episodes(resolved))
         _on_the_floor(checks, bench)
         _on_the_twin(checks, bench)
         return checks.report()
 
 
 def _on_the_floor(checks: Checks, bench: Bench) -> None:
-    checks.run("finite", lambda: _finite(bench))
-    checks.run("keeps to limits", lambda: _limits(bench))
-    checks.run("trace declared", lambda: _trace(bench))
-    checks.run("deterministic", lambda: _deterministic(bench))
-    checks.run("reset equals new", lambda: _reset(bench))
-    checks.run("no state shared", lambda: _shared(bench))
     heard = Heard()
-    checks.run("no clock", lambda: _no_clock(bench, heard))
-    checks.run("no unseeded random number", lambda: _no_random(heard))
-    checks.run("mirror symmetry", lambda: _mirror(bench))
+    made = (
+        _finite, _limits, _trace, _deterministic, _reset, _shared,
+        lambda bench: _no_clock(bench, heard), lambda _: _no_random(heard), _mirror,
+    )  # fmt: skip
+    for name, check in zip(ON_THE_FLOOR, made, strict=True):
+        checks.run(name, partial(check, bench))
 
 
 def _on_the_twin(checks: Checks, bench: Bench) -> None:
     runs: list[RunRecord] = []
-    held = checks.run("scenario holds", lambda: _holds(bench, runs))
+    holds, itself, control = ON_THE_TWIN
+    held = checks.run(holds, lambda: _holds(bench, runs))
     if not runs:
-        checks.leave_out(("against itself", "negative control"), "the law does not run")
+        checks.leave_out((itself, control), "the law does not run")
         return
-    checks.run("against itself", lambda: _itself(bench, runs[0]))
+    checks.run(itself, lambda: _itself(bench, runs[0]))
     if held:
-        checks.run("negative control", lambda: _turned(bench))
+        checks.run(control, lambda: _turned(bench))
     else:
-        checks.leave_out(("negative control",), "it needs a law that holds the scenario")
+        checks.leave_out((control,), "it needs a law that holds the scenario")
 
 
 # -- on the floor ------------------------------------------------------------------------------

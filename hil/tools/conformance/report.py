@@ -65,9 +65,7 @@ class Report:
             "name": self.name,
             "origin": self.origin,
             "passed": self.passed,
-            "checks": [
-                {"name": f.name, "holds": f.holds, "said": f.said} for f in self.findings
-            ],
+            "checks": [{"name": f.name, "holds": f.holds, "said": f.said} for f in self.findings],
         }
 
     def required(self) -> Report:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from hil.config.fit import check_fit
@@ -40,7 +41,7 @@ def robot_report(robot: str | Path, *, overrides: Sequence[str] = ()) -> Report:
     checks.run("values fit together", lambda: _fits(scenarios))
     runs: list[RunRecord] = []
     for scenario in scenarios:
-        checks.run(f"{scenario.name} holds", lambda task=scenario: _holds(task, runs))  # type: ignore[misc]
+        checks.run(f"{scenario.name} holds", partial(_holds, scenario, runs))
     rest = ("against itself", "negative control")
     if len(runs) < len(scenarios):
         checks.leave_out(rest, "the robot does not run")

@@ -113,7 +113,11 @@ def _seen(t_s: float, pose: Pose, rng: random.Random) -> Given:
 
 def _with_truth(event: Given | Asked, truth: list[Pose]) -> Given | Asked:
     """Give a question the truth of the instant that it asks for."""
-    return replace(event, truth=truth[round(event.t_s / _STEP_S)]) if isinstance(event, Asked) else event
+    return (
+        replace(event, truth=truth[round(event.t_s / _STEP_S)])
+        if isinstance(event, Asked)
+        else event
+    )
 
 
 def mirrored_drive(drive: Drive) -> Drive:

@@ -80,5 +80,5 @@ def watch(heard: Heard) -> Iterator[None]:
 
 
 def _numpy_state() -> tuple[bytes, int]:
-    state: Any = np.random.get_state(legacy=True)  # noqa: NPY002 - it is looked at, not used
+    state: Any = np.random.get_state(legacy=True)
     return state[1].tobytes(), state[2]
