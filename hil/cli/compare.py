@@ -57,8 +57,9 @@ def command(
         print_json(found.to_json())
         return judged_status(records)
     print_study(found)
-    if report is not None:
-        click.echo(f"report: {visible(str(report))}")
+    for name, path in (("report", report), ("csv", csv_file), ("rerun", rerun)):
+        if path is not None:
+            click.echo(f"{name}: {visible(str(path))}")
     return judged_status(records)
 
 

@@ -12,10 +12,12 @@ from hil.cli.options import (
     camera_option,
     json_option,
     out_option,
+    outers_option,
     print_json,
     seed_option,
     set_option,
     target_option,
+    warn_unfinished,
 )
 from hil.cli.progress import run_progress
 from hil.core.text import visible
@@ -24,6 +26,7 @@ from hil.core.text import visible
 @click.command("experiment")
 @click.argument("deck", default="thesis")
 @target_option
+@outers_option
 @click.option("--inner", type=click.Choice([*INNER_LAWS.choices, "both"]), default="asg-ism",
               show_default=True, help="Wheel law, on the board; both gives the 2 x 2 matrix.")  # fmt: skip
 @camera_option
@@ -36,6 +39,7 @@ from hil.core.text import visible
 def command(
     deck: str,
     target: str,
+    outers: tuple[str, ...],
     inner: str,
     camera: str | None,
     repeats: int,
@@ -44,13 +48,14 @@ def command(
     out: Path | None,
     as_json: bool,
 ) -> int:
-    """Run every scenario of DECK with both laws and write one report.
+    """Run every scenario of DECK with every law and write one report.
 
     DECK is the built-in deck `thesis` (the three experiments) or a TOML file with `scenarios` and
-    `laws`. Both laws of a scenario get the same seeds: the same noise, delays and losses. With
-    --repeats the report gives paired differences with 95 % intervals.
+    `laws`; --outer puts other laws in their place. All laws of a scenario get the same seeds: the
+    same noise, delays and losses. With --repeats the report gives paired differences with 95 % intervals.
 
-    The same command with the same --out takes an interrupted experiment up where it stopped.
+    The same command with the same --out takes an interrupted experiment up where it stopped; a run
+    that was cut off, or whose record is damaged, is moved to set-aside/ and done anew.
     """
     from hil.config.deck import load_deck
     from hil.record.manifest import command_line
@@ -58,25 +63,28 @@ def command(
     from hil.report.html import write_report
     from hil.runs.execute import exit_status, new_folder
     from hil.study.experiment import (
+        REPORT,
         Conditions,
         circle_study,
         claim,
         deck_specs,
-        run_all,
-        run_name,
         study_by_scenario,
+        writing,
     )
+    from hil.study.side_by_side import run_all, run_name
 
     conditions = Conditions(target, camera, inner, seed, repeats, overrides, command_line())
     folder = out or new_folder("experiment")
-    specs = deck_specs(load_deck(deck), conditions, folder)
-    todo = claim(folder, specs)
-    if len(todo) < len(specs):
-        click.echo(f"{len(specs) - len(todo)} of {len(specs)} runs are there already", err=True)
-    with run_progress({run_name(spec): spec.scenario.duration_s for spec in todo}) as update:
-        run_all(todo, update)
+    specs = deck_specs(load_deck(deck, outers), conditions, folder)
+    warn_unfinished({spec.scenario.name: spec.scenario for spec in specs}.values())
+    with writing(folder):
+        todo = claim(folder, specs, _say)
+        if len(todo) < len(specs):
+            _say(f"{len(specs) - len(todo)} of {len(specs)} runs are there already")
+        with run_progress({run_name(spec): spec.scenario.duration_s for spec in todo}) as update:
+            run_all(todo, update)
     records = [read_run(spec.out) for spec in specs]
-    report = folder / "report.html"
+    report = folder / REPORT
     studies = study_by_scenario(records)
     write_report(
         report,
@@ -92,3 +100,7 @@ def command(
             print_study(item)
         click.echo(f"report: {visible(str(report))}")
     return max(exit_status(record) for record in records)
+
+
+def _say(text: str) -> None:
+    click.echo(visible(text), err=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import signal
 import sys
 from typing import NoReturn
 
@@ -12,13 +13,15 @@ import click
 from hil import __version__
 from hil.core.errors import HilError
 from hil.core.text import visible
+from hil.runs.interruption import end_as_by_ctrl_c
+from hil.study.work_folder import Terminated
 
 # name -> (module, one-line help). The text stands here so that `hil --help` imports no command.
 COMMANDS = {
     "run": ("hil.cli.run", "Run one scenario on a target and record it."),
     "experiment": (
         "hil.cli.experiment",
-        "Run every scenario of a deck with both laws; one report.",
+        "Run every scenario of a deck with every law; one report.",
     ),
     "compare": ("hil.cli.compare", "Compare recorded runs: table, JSON and HTML report."),
     "replay": ("hil.cli.replay", "Replay a record exactly, or with another law as its shadow."),
@@ -28,7 +31,11 @@ COMMANDS = {
     "list": ("hil.cli.listing", "List laws, estimators, localisers, scenarios, ... with settings."),
     "new": ("hil.cli.new", "Write a starting point for a law, scenario, robot or localiser."),
     "check": ("hil.cli.check", "Check a law, estimator, localiser or robot of your own."),
-    "tune": ("hil.cli.tune", "Tune the gains of both laws by one procedure and budget."),
+    "reproduce": (
+        "hil.cli.reproduce",
+        "Reproduce the thesis's numerical studies, chapters 4 to 8; judge its claims.",
+    ),
+    "tune": ("hil.cli.tune", "Tune the gains of laws by one procedure and budget."),
     "twin": ("hil.cli.twin", "Serve the digital twin to other programs."),
     "firmware": ("hil.cli.firmware", "Generate, build, upload and configure the firmware."),
     "calibrate": ("hil.cli.calibrate", "Calibrate lens, camera pose over the floor, and colours."),
@@ -70,12 +77,13 @@ def cli() -> None:
 
     \b
     Exit status: 0 all requirements held, 1 a requirement failed, 2 bad usage or input,
-    3 rig fault (port, camera, board), 130 stopped by Ctrl-C.
+    3 rig fault (port, camera, board), 130 stopped by Ctrl-C (or SIGTERM, SIGHUP).
     """  # noqa: D301 - \b is click's mark for a verbatim paragraph
 
 
 def main() -> NoReturn:
     """Run the command line; every expected error is one line on stderr and its exit status."""
+    end_as_by_ctrl_c()
     try:
         status = cli.main(prog_name="hil", standalone_mode=False)
         sys.exit(status if isinstance(status, int) else 0)
@@ -88,7 +96,10 @@ def main() -> NoReturn:
     except HilError as error:
         click.echo(f"hil: {visible(str(error))}", err=True)
         sys.exit(error.exit_status)
-    except (click.Abort, KeyboardInterrupt):
+    except (click.Abort, KeyboardInterrupt) as error:
+        if isinstance(error.__cause__ or error, Terminated):
+            click.echo("hil: stopped by SIGTERM", err=True)
+            sys.exit(128 + signal.SIGTERM)
         click.echo("hil: stopped by Ctrl-C", err=True)
         sys.exit(130)
     except BrokenPipeError:

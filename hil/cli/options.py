@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -11,6 +11,8 @@ import click
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from hil.config.scenario import Scenario
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -30,6 +32,10 @@ outer_option = click.option(
     "--outer", metavar="LAW",
     help="Outer law, on the host: a name that `hil list laws` shows, FILE.py or FILE.py:NAME. "
     "[default: as the scenario says: asg-ism]",
+)  # fmt: skip
+outers_option = click.option(
+    "--outer", "outers", multiple=True, metavar="LAW",
+    help="Outer law: a name that `hil list laws` shows, FILE.py or FILE.py:NAME; may be repeated.",
 )  # fmt: skip
 inner_option = click.option("--inner", type=INNER_LAWS, default="asg-ism", show_default=True,
                             help="Wheel law, on the board.")  # fmt: skip
@@ -59,3 +65,13 @@ def plain_console() -> Console:
 def print_json(document: dict[str, Any]) -> None:
     """Write one JSON document to stdout."""
     click.echo(json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False))
+
+
+def warn_unfinished(scenarios: Iterable[Scenario]) -> None:
+    """Say on stderr where a run would end before its reference does."""
+    from hil.control.references import unfinished
+
+    for scenario in scenarios:
+        told = unfinished(scenario.reference, scenario.duration_s)
+        if told is not None:
+            click.echo(f"note: {scenario.name}: {told}", err=True)

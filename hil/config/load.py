@@ -116,12 +116,22 @@ _PLUGIN_KEYS = (
 )  # fmt: skip
 
 
+# Lists of outer laws: of a campaign, of a deck.
+_PLUGIN_LISTS = ("outer", "laws")
+
+
 def _set_files_beside(tree: Tree, folder: Path | None) -> None:
     """Make the path of a law's file and the like, named relative to the scenario's, whole; in place."""
     for table, key in _PLUGIN_KEYS:
         node = tree.get(table)
         if folder is not None and isinstance(node, dict) and is_file_name(str(node.get(key, ""))):
             node[key] = str(folder.resolve() / node[key])
+    for key in _PLUGIN_LISTS:
+        names = tree.get(key)
+        if folder is not None and isinstance(names, list):
+            tree[key] = [
+                str(folder.resolve() / name) if is_file_name(str(name)) else name for name in names
+            ]
 
 
 def _base_kind(base: str, kind: str) -> str:
@@ -153,8 +163,10 @@ def _read_text(name_or_path: str, kind: str) -> tuple[str, str, Path | None]:
     if not path.is_file():
         names = builtin_names(kind)
         near = difflib.get_close_matches(name_or_path, names, n=2)
-        hint = f"did you mean {' or '.join(near)}?" if near else f"built in: {', '.join(names)}"
-        raise BadInput(f"{one} {name_or_path!r}: no such file and no built-in {one}; {hint}")
+        known = f"; built in: {', '.join(names)}" if names else ""
+        hint = f"; did you mean {' or '.join(near)}?" if near else known
+        none = f" and no built-in {one}" if names else f"; give the path of a {one} file"
+        raise BadInput(f"{one} {name_or_path!r}: no such file{none}{hint}")
     try:
         return path.read_text(encoding="utf-8"), str(path), path.parent
     except (OSError, UnicodeDecodeError) as error:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Literal, Self
 
 from pydantic import Field, SerializeAsAny, field_validator, model_validator
@@ -15,8 +15,7 @@ from hil.config.link import LinkConfig
 from hil.config.robot import RobotConfig
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME, require_known
-from hil.core.registries import BY_KIND
-from hil.core.registry import SourceText
+from hil.core.registries import Sources, adopt_sources, file_sources
 
 
 class StartPose(Section):
@@ -111,18 +110,12 @@ class Scenario(Section):
 
     def __reduce__(self) -> Any:
         """Pickle with the texts of what came from files: another process gets to know it by them."""
-        sources = [
-            (registry.kind, entry.source)
-            for registry in BY_KIND.values()
-            for entry in registry.entries()
-            if entry.source is not None
-        ]
+        sources = file_sources()
         if not sources:
             return super().__reduce__()
         return _unpickled, (self.model_dump(mode="json"), sources)
 
 
-def _unpickled(tree: dict[str, Any], sources: Sequence[tuple[str, SourceText]]) -> Scenario:
-    for kind, source in sources:
-        BY_KIND[kind].adopt(source)
+def _unpickled(tree: dict[str, Any], sources: Sources) -> Scenario:
+    adopt_sources(sources)
     return Scenario.model_validate(tree)
