@@ -50,7 +50,7 @@ def test_viewer_has_a_chart_for_them(run: Path, tmp_path: Path):
     assert b"law/abeam_m_s" in (tmp_path / "run.rrd").read_bytes()
 
 
-def test_exact_replay_compares_them(run: Path, tmp_path: Path):
+def test_exact_replay_compares_them(run: Path):
     """The replay reproduces the term bit for bit, and an altered one is the difference it finds."""
     assert hil("replay", run).status == 0
     channels = {c["name"]: c for c in hil("replay", run, "--json").json["channels"]}

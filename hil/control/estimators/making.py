@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from hil.config.control import ControlConfig, EstimatorConfig
+from hil.control.estimators.completed import completed
 from hil.core.registries import ESTIMATORS
 
 if TYPE_CHECKING:
@@ -25,7 +26,6 @@ def make_estimator(
     own = config.own_settings_of(entry) if isinstance(config, ControlConfig) else None
     if entry.settings is not None and own is None:
         own = entry.settings()
-    made: Estimator = (
-        entry.factory(fusion, geometry) if own is None else entry.factory(fusion, geometry, own)
-    )
+    given = (fusion, geometry) if own is None else (fusion, geometry, own)
+    made: Estimator = completed(entry.factory(*given))
     return made
