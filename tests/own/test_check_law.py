@@ -101,10 +101,7 @@ def test_a_scenario_that_says_nothing_of_a_law_is_told():
 
 
 def test_exit_statuses_and_json(tmp_path: Path):
-    """0 when all holds, 1 when a check does not, 2 for what cannot be checked."""
-    good = command("check", "law", "pid", "--json")
-    assert good.status == 0
-    assert good.json["passed"] is True
+    """1 when a check does not hold, 2 for what cannot be checked (0: where `hil new` is tested)."""
     bad = written(tmp_path / "bad.py", law_text("bad").replace(*BROKEN["mirror symmetry"]))
     done = command("check", "law", bad, "--set", "duration_s=1")
     assert done.status == 1

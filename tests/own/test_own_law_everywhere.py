@@ -18,7 +18,7 @@ from tests.cli.command import hil, run_pose
 from tests.own.starts import law_text, written
 
 DECK = 'scenarios = ["./short.toml"]\nlaws = ["pid"]\n'
-SHORT = 'base = "scenario-1"\nname = "short"\nduration_s = 1.0\n'
+SHORT = 'base = "scenario-1"\nname = "short"\nduration_s = 0.5\n'
 
 
 @pytest.fixture

@@ -38,9 +38,9 @@ class MyThing:
         search_radius_m: float,  # noqa: ARG002
     ) -> hil.PoseMeasurement:
         """Return the pose of the centre of mass, or None with the reason."""
-        blue, green, red = cv2.split(image_bgr.astype(np.float32))
-        front = self._centre(red - np.maximum(green, blue))
-        rear = self._centre(green - np.maximum(red, blue))
+        blue, green, red = cv2.split(image_bgr)
+        front = self._centre(cv2.subtract(red, cv2.max(green, blue)))  # nothing below zero
+        rear = self._centre(cv2.subtract(green, cv2.max(red, blue)))
         if front is None or rear is None:
             which = "front" if front is None else "rear"
             return hil.PoseMeasurement(None, 0.0, f"{which} mark not found")
