@@ -10,10 +10,17 @@ from collections.abc import Sequence
 
 from hil.core.registry import Registry, SourceText
 
-OUTER_LAWS = Registry("outer law", "skid_steer_hil.outer_laws", "hil.control.laws")
-ESTIMATORS = Registry("estimator", "skid_steer_hil.estimators", "hil.control.estimators")
-REFERENCES = Registry("reference", "skid_steer_hil.references", "hil.control.references")
-LOCALISERS = Registry("localiser", "skid_steer_hil.localisers", "vision.localisers")
+OUTER_LAWS = Registry(
+    "outer law", "skid_steer_hil.outer_laws", "hil.control.laws", ("reset", "step")
+)
+ESTIMATORS = Registry(
+    "estimator",
+    "skid_steer_hil.estimators",
+    "hil.control.estimators",
+    ("on_wheels", "on_pose", "on_command", "estimate_at"),
+)
+REFERENCES = Registry("reference", "skid_steer_hil.references", "hil.control.references", ("at",))
+LOCALISERS = Registry("localiser", "skid_steer_hil.localisers", "vision.localisers", ("locate",))
 
 # As `hil list` names them.
 BY_PLURAL = {

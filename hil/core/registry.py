@@ -75,8 +75,9 @@ class Entry:
 class Registry:
     """All things of one kind. `kind` is how messages call one of them."""
 
-    def __init__(self, kind: str, group: str, home: str) -> None:
+    def __init__(self, kind: str, group: str, home: str, methods: tuple[str, ...] = ()) -> None:
         self.kind = kind
+        self._methods = methods
         self.group = group
         self._home = home
         self._entries: dict[str, Entry] = {}
@@ -234,6 +235,7 @@ class Registry:
         finally:
             self._entries, self._loading = before, loading
         for entry in found:
+            self._require_methods(entry)
             if entry.name in before and before[entry.name].origin != entry.origin:
                 other = before[entry.name].origin
                 raise BadInput(
@@ -242,6 +244,16 @@ class Registry:
                 )
             before[entry.name] = entry
         return found
+
+    def _require_methods(self, entry: Entry) -> None:
+        """Raise BadInput when a class lacks what every thing of this kind must have."""
+        missing = [name for name in self._methods if not hasattr(entry.factory, name)]
+        article = "an" if self.kind[0] in "aeiou" else "a"
+        if isinstance(entry.factory, type) and missing:
+            raise BadInput(
+                f"{self.kind} {entry.name} ({entry.origin}): class {entry.factory.__name__} has no "
+                f"{' and no '.join(missing)}; {article} {self.kind} needs {', '.join(self._methods)}"
+            )
 
     def _find_all_into(self, known: dict[str, Entry]) -> None:
         """Have the built-in things found before a file is run, so that its names are compared."""

@@ -52,17 +52,21 @@ class Plugin(BaseModel):
     origin: str = Field(description="the package, or the file's path when it ran")
     sha256: str = Field("", description="of the file's text; empty for a package")
     file: str = Field("", description="the text, inside the record's folder")
+    label: str = Field("", description="of a law, in reports")
+    colour: str = Field("", description="of a law, in reports")
     _text: str = PrivateAttr("")
 
     @classmethod
     def of(cls, kind: str, entry: Entry) -> Plugin:
         """Return what the record says of a registry's entry."""
+        look = {"label": entry.label, "colour": entry.colour}
         if entry.source is None:
-            return cls(kind=kind, name=entry.name, origin=entry.origin)
+            return cls(kind=kind, name=entry.name, origin=entry.origin, **look)
         file = f"{layout.PLUGINS}/{kind.replace(' ', '_')}-{entry.source.path.name}"
         plugin = cls(
-            kind=kind, name=entry.name, origin=entry.origin, sha256=entry.source.sha256, file=file
-        )
+            kind=kind, name=entry.name, origin=entry.origin, sha256=entry.source.sha256, file=file,
+            **look,
+        )  # fmt: skip
         plugin._text = entry.source.text
         return plugin
 

@@ -147,3 +147,19 @@ def test_what_new_writes_passes_the_kit(kind, tmp_path: Path, monkeypatch):
     done = command("check", kind, f"fresh-{kind}.py", "--json")
     assert [check for check in done.json["checks"] if not check["holds"]] == []
     assert done.status == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "decorator", "missing"),
+    [
+        ("law", "outer_law", "reset and no step; a outer law needs reset, step"),
+        ("estimator", "estimator", "on_wheels and no on_pose"),
+        ("localiser", "localiser", "locate"),
+    ],
+)
+def test_a_class_that_is_none_is_told_what_is_missing(kind, decorator, missing, tmp_path: Path):
+    """A registered class without its methods is refused when it is loaded, not in a run."""
+    text = f'import hil\n\n\n@hil.{decorator}("hollow-{kind}")\nclass Hollow:\n    pass\n'
+    refusal = command("check", kind, written(tmp_path / "hollow.py", text)).refusal
+    assert "class Hollow has no " in refusal
+    assert missing.replace("a outer", "an outer") in refusal

@@ -11,6 +11,8 @@ import pytest
 from hil.record.reader import read_run
 from hil.record.rrd import blueprint, own_plots, write_rrd
 from hil.record.schema import SAMPLE_NAMES
+from hil.report.compare import compare_runs
+from hil.report.figures import own_colours
 from tests.cli.command import hil, run_pose
 from tests.own.starts import law_text, written
 
@@ -105,3 +107,12 @@ def test_a_trace_value_that_is_no_number_ends_the_run_in_good_order(tmp_path: Pa
     assert done.status == 3
     assert "trace['abeam_m_s'] = 'left', not a number" in done.out
     assert read_run(tmp_path / "run").manifest.outcome == "fault"
+
+
+def test_colour_of_a_law_stands_in_its_record(run: Path):
+    """A report made where the law is not known paints it as it registered itself."""
+    record = read_run(run)
+    (plugin,) = record.manifest.plugins
+    assert (plugin.label, plugin.colour) == ("traced-law", "#009e73")
+    (entry,) = compare_runs([record], 1).entries
+    assert own_colours([entry])["traced-law"] == "#009e73"
