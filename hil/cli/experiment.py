@@ -10,6 +10,7 @@ from hil.cli.compare import print_study
 from hil.cli.options import (
     INNER_LAWS,
     camera_option,
+    figures_option,
     json_option,
     out_option,
     outers_option,
@@ -35,6 +36,7 @@ from hil.core.text import visible
 @seed_option
 @set_option
 @out_option
+@figures_option
 @json_option
 def command(
     deck: str,
@@ -46,6 +48,7 @@ def command(
     seed: int,
     overrides: tuple[str, ...],
     out: Path | None,
+    figures: Path | None,
     as_json: bool,
 ) -> int:
     """Run every scenario of DECK with every law and write one report.
@@ -61,6 +64,7 @@ def command(
     from hil.record.manifest import command_line
     from hil.record.reader import read_run
     from hil.report.html import write_report
+    from hil.report.paper import figures_kept
     from hil.runs.execute import exit_status, new_folder
     from hil.study.experiment import (
         REPORT,
@@ -86,13 +90,14 @@ def command(
     records = [read_run(spec.out) for spec in specs]
     report = folder / REPORT
     studies = study_by_scenario(records)
-    write_report(
-        report,
-        [item.comparison for item in studies],
-        command=conditions.command,
-        circle=circle_study(),
-        repeats=[item.repeats for item in studies if item.repeats],
-    )
+    with figures_kept(figures):
+        write_report(
+            report,
+            [item.comparison for item in studies],
+            command=conditions.command,
+            circle=circle_study(),
+            repeats=[item.repeats for item in studies if item.repeats],
+        )
     if as_json:
         print_json({"report": str(report), "comparisons": [item.to_json() for item in studies]})
     else:

@@ -51,6 +51,11 @@ out_option = click.option(
     "--out", type=click.Path(path_type=Path), metavar="DIR",
     help="Folder for the record(s); must not exist or be empty. [default: a new one in runs/]",
 )  # fmt: skip
+figures_option = click.option(
+    "--figures", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
+    help="Also write each figure of the report as SVG, PDF and PNG, one and two columns wide, with "
+    "its data as CSV.",
+)  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True,
                            help="One JSON document on stdout, nothing else.")  # fmt: skip
 

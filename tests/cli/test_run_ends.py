@@ -14,7 +14,7 @@ from tests.cli.command import hil, run_pose
 
 CAUSES = [
     ("camera.drop_ratio=1", "camera: robot seen 0 times"),
-    ("start.x_m=5", "geofence: robot at (5.000"),
+    ("start.x_m=5", "geofence: robot seen at (5.000"),
     ('faults=[{kind="link_cut"}]', ""),
     ('faults=[{kind="camera_stall"}]', "camera: "),
 ]

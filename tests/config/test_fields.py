@@ -157,4 +157,4 @@ def test_the_built_in_values_come_with_their_sources() -> None:
     assert len(gains) == 2 * (9 + 4)
     assert all(isinstance(item.default, float) for item in gains)
     thesis_k1 = listed["control.gains.thesis.asg_ism.k1_s", ""]
-    assert thesis_k1.source == "not printed; control.md section 2"
+    assert thesis_k1.source == "docs/control.md section 6"

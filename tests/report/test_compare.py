@@ -205,7 +205,7 @@ def test_a_run_shorter_than_its_path_is_named(tmp_path):
 
 
 def test_a_run_says_at_its_start_that_it_ends_too_soon(tmp_path):
-    """`hil run` of a hairpin: one note on stderr with the time that the path takes."""
+    """`hil run` of a hairpin: one note with the time that the path takes."""
     hairpin = 'reference={kind="waypoints",points_m=[[-0.6,-0.35],[0.3,-0.35],[-0.5,-0.34]]}'
     done = subprocess.run(
         [sys.executable, "-m", "hil", "run", "scenario-1", "--camera", "pose", "--set", hairpin,
@@ -213,4 +213,4 @@ def test_a_run_says_at_its_start_that_it_ends_too_soon(tmp_path):
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0
-    assert "note: scenario-1: reference.points_m: the way takes" in done.stderr
+    assert "note: reference.points_m: the way takes" in done.stdout

@@ -66,7 +66,7 @@ def test_a_campaign_without_one_whole_run_is_no_success(tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text(text, encoding="utf-8")
     made = hil(tmp_path, "sweep", "c.toml", "--out", "s", "--workers", "1")
     assert made.returncode == 3
-    assert "2 of 2 runs ended in a fault (most often: geofence: robot at (5.000" in made.stdout
+    assert "2 of 2 runs ended in a fault (most often: geofence: robot seen at (5.000" in made.stdout
     assert "not told apart" not in made.stdout
 
 
