@@ -25,7 +25,16 @@ _NAMES = {
     "BadInput": ("hil.core.errors", "BadInput"),
     "RigFault": ("hil.core.errors", "RigFault"),
     "Section": ("hil.config.base", "Section"),
+    "quantity": ("hil.config.base", "quantity"),
+    "check_estimator": ("hil.tools.conformance", "check_estimator"),
+    "check_law": ("hil.tools.conformance", "check_law"),
+    "check_localiser": ("hil.tools.conformance", "check_localiser"),
+    "check_robot": ("hil.tools.conformance", "check_robot"),
     "Scenario": ("hil.config.scenario", "Scenario"),
+    "BelievedGeometry": ("hil.control.estimators.geometry", "BelievedGeometry"),
+    "CameraConfig": ("hil.config.camera", "CameraConfig"),
+    "EstimatorConfig": ("hil.config.control", "EstimatorConfig"),
+    "camera_model": ("vision.camera_setup", "camera_model"),
     "OuterLimits": ("hil.config.control", "OuterLimits"),
     "ReferenceConfig": ("hil.config.control", "ReferenceConfig"),
     "Comparison": ("hil.api", "Comparison"),
@@ -49,9 +58,12 @@ _DECORATORS = {
 
 __all__ = [
     "BadInput",
+    "BelievedGeometry",
+    "CameraConfig",
     "Comparison",
     "Estimate",
     "Estimator",
+    "EstimatorConfig",
     "Experiment",
     "Localiser",
     "OuterCommand",
@@ -68,6 +80,11 @@ __all__ = [
     "Section",
     "WheelSample",
     "__version__",
+    "camera_model",
+    "check_estimator",
+    "check_law",
+    "check_localiser",
+    "check_robot",
     "compare",
     "estimator",
     "experiment",
@@ -76,6 +93,7 @@ __all__ = [
     "make_env",
     "open_record",
     "outer_law",
+    "quantity",
     "reference",
     "replay",
     "run",
@@ -93,9 +111,13 @@ if TYPE_CHECKING:
     from hil.api import replay as replay
     from hil.api import run as run
     from hil.config.base import Section as Section
+    from hil.config.base import quantity as quantity
+    from hil.config.camera import CameraConfig as CameraConfig
+    from hil.config.control import EstimatorConfig as EstimatorConfig
     from hil.config.control import OuterLimits as OuterLimits
     from hil.config.control import ReferenceConfig as ReferenceConfig
     from hil.config.scenario import Scenario as Scenario
+    from hil.control.estimators.geometry import BelievedGeometry as BelievedGeometry
     from hil.control.references import Reference as Reference
     from hil.core.errors import BadInput as BadInput
     from hil.core.errors import RigFault as RigFault
@@ -108,6 +130,11 @@ if TYPE_CHECKING:
     from hil.core.types import PoseMeasurement as PoseMeasurement
     from hil.core.types import ReferenceState as ReferenceState
     from hil.core.types import WheelSample as WheelSample
+    from hil.tools.conformance import check_estimator as check_estimator
+    from hil.tools.conformance import check_law as check_law
+    from hil.tools.conformance import check_localiser as check_localiser
+    from hil.tools.conformance import check_robot as check_robot
+    from vision.camera_setup import camera_model as camera_model
     from vision.tracker import Localiser as Localiser
 
     outer_law = OUTER_LAWS.register

@@ -14,6 +14,7 @@ from hil.cli.options import (
     figures_option,
     json_option,
     out_option,
+    outers_option,
     print_json,
     seed_option,
     set_option,
@@ -27,6 +28,7 @@ from hil.core.text import visible
 @click.command("experiment")
 @click.argument("deck", default="thesis")
 @target_option
+@outers_option
 @click.option("--inner", type=click.Choice([*INNER_LAWS.choices, "both"]), default="asg-ism",
               show_default=True, help="Wheel law, on the board; both gives the 2 x 2 matrix.")  # fmt: skip
 @camera_option
@@ -41,6 +43,7 @@ from hil.core.text import visible
 def command(
     deck: str,
     target: str,
+    outers: tuple[str, ...],
     inner: str,
     camera: str | None,
     repeats: int,
@@ -51,11 +54,11 @@ def command(
     junit: Path | None,
     as_json: bool,
 ) -> int:
-    """Run every scenario of DECK with both laws and write one report.
+    """Run every scenario of DECK with every law and write one report.
 
     DECK is the built-in deck `thesis` (the three experiments) or a TOML file with `scenarios` and
-    `laws`. Both laws of a scenario get the same seeds: the same noise, delays and losses. With
-    --repeats the report gives paired differences with 95 % intervals.
+    `laws`; --outer puts other laws in their place. All laws of a scenario get the same seeds: the
+    same noise, delays and losses. With --repeats the report gives paired differences with 95 % intervals.
 
     The same command with the same --out takes an interrupted experiment up where it stopped; a run
     that was cut off, or whose record is damaged, is moved to set-aside/ and done anew.
@@ -79,7 +82,7 @@ def command(
 
     conditions = Conditions(target, camera, inner, seed, repeats, overrides, command_line())
     folder = out or new_folder("experiment")
-    specs = deck_specs(load_deck(deck), conditions, folder)
+    specs = deck_specs(load_deck(deck, outers), conditions, folder)
     warn_unfinished({spec.scenario.name: spec.scenario for spec in specs}.values())
     with junit_file(junit, f"experiment.{deck}"), writing(folder):
         todo = claim(folder, specs, _say)

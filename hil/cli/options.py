@@ -30,6 +30,10 @@ outer_option = click.option(
     help="Outer law, on the host: a name that `hil list laws` shows, FILE.py or FILE.py:NAME. "
     "[default: as the scenario says: asg-ism]",
 )  # fmt: skip
+outers_option = click.option(
+    "--outer", "outers", multiple=True, metavar="LAW",
+    help="Outer law: a name that `hil list laws` shows, FILE.py or FILE.py:NAME; may be repeated.",
+)  # fmt: skip
 inner_option = click.option("--inner", type=INNER_LAWS, default="asg-ism", show_default=True,
                             help="Wheel law, on the board.")  # fmt: skip
 seed_option = click.option(

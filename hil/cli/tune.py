@@ -1,4 +1,4 @@
-"""`hil tune`: the gains of both outer laws by one search, one cost and one budget."""
+"""`hil tune`: the gains of outer laws by one search, one cost and one budget."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hil.cli.options import json_option, print_json, set_option
+from hil.cli.options import json_option, outers_option, print_json, set_option
 from hil.core.text import visible
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 @click.argument("tasks", nargs=-1, metavar="[SCENARIO...]")
 @click.option("--robot", metavar="FILE",
               help="Robot in place of each scenario's own: a TOML file, or built in.")  # fmt: skip
+@outers_option
 @set_option
 @click.option("--candidates", type=click.IntRange(11, 100_000), default=301, show_default=True,
               help="Candidates for each law; each runs every case with every seed.")  # fmt: skip
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 def command(
     tasks: tuple[str, ...],
     robot: str | None,
+    outers: tuple[str, ...],
     overrides: tuple[str, ...],
     candidates: int,
     seed: int,
@@ -54,18 +56,21 @@ def command(
     out: Path,
     as_json: bool,
 ) -> None:
-    """Tune ASG-ISM and PID on the twin with the same budget, cases and cost (docs/control.md).
+    """Tune outer laws on the twin with the same budget, cases and cost (docs/control.md).
+
+    ASG-ISM and PID, or those that --outer names: what is searched is the box that the law declares. A
+    law named so is judged beside both built-in ones, with the gains they have.
 
     SCENARIO... are the tasks: built-in names, TOML files, or one deck; the three scenarios of the
     thesis when none is given. Each is run calm, pushed, late and, where it goes to a point, beside it.
 
     The result is a gain set with its origin. It is judged at once on a held-out tape: the tasks with
-    seeds no candidate has seen, both laws under the same ones. Some ten minutes of two cores; a
+    seeds no candidate has seen, all laws under the same ones. Some ten minutes of two cores; a
     search that is interrupted keeps its runs in FILE.search, and the same command goes on.
     """
     from hil.core.errors import BadInput
     from hil.study.campaign.results import program
-    from hil.study.tune import Plan, write_gain_set
+    from hil.study.tune import SEARCH, Plan, boxes_of, write_gain_set
     from hil.study.tune_work import Journal, identity_of, load_tasks
     from hil.study.work_folder import sigterm_stops, sole_writer
 
@@ -73,37 +78,45 @@ def command(
         raise BadInput(f"--out {out}: exists already; name a new file")
     if not os.access(out.absolute().parent, os.W_OK):
         raise BadInput(f"--out {out}: no folder {out.absolute().parent} that can be written to")
+    laws = tuple(boxes_of(outers)) or tuple(SEARCH)
     asked = load_tasks(tasks, robot, overrides)
     plan = Plan(cases=asked.cases(), candidates=candidates, search_seed=seed)
     with sole_writer(out.with_name(f"{out.name}.lock"), f"--out {out}"), sigterm_stops():
-        identity = identity_of(asked, plan, camera, program())
+        identity = identity_of(asked, plan, camera, program(), laws)
         with Journal(out.with_name(f"{out.name}.search"), identity) as journal:
             for note in journal.notes:
                 click.echo(f"note: {note}", err=True)
             if len(journal):
                 click.echo(f"{len(journal)} runs are there already", err=True)
             try:
-                gains, verdict = _searched(asked, plan, repeats, camera, workers, journal)
+                gains, verdicts = _searched(asked, plan, laws, repeats, camera, workers, journal)
             except KeyboardInterrupt:
                 click.echo(f"kept in {journal.path}; the same command goes on", err=True)
                 raise
             write_gain_set(out, gains)
             journal.remove()
     if as_json:
-        print_json({"gains": gains.model_dump(), "verdict": verdict.to_json()})
+        told = [verdict.to_json() for verdict in verdicts]
+        print_json({"gains": gains.model_dump(), "verdict": told[0], "verdicts": told})
     else:
-        _print(out, gains, verdict)
+        _print(out, gains, laws, verdicts)
 
 
 def _searched(
-    tasks: Tasks, plan: Plan, repeats: int, camera: str, workers: int | None, journal: Journal
-) -> tuple[Gains, Verdict]:
+    tasks: Tasks,
+    plan: Plan,
+    laws: Sequence[str],
+    repeats: int,
+    camera: str,
+    workers: int | None,
+    journal: Journal,
+) -> tuple[Gains, list[Verdict]]:
     """Search, judge, and return the gains with both in their origin."""
     from hil.cli.progress import stage_progress
     from hil.record.manifest import git_revision
     from hil.study import tune
     from hil.study.campaign.workers import Pool
-    from hil.study.tuning_verdict import held_out_trials, judge, with_verdict
+    from hil.study.tuning_verdict import held_out_trials, judge, pairs_of, with_verdict
 
     worker = tune.OnTarget("twin", camera, dict(tasks.scenarios) if tasks.own else {})
     with stage_progress() as stage, Pool(worker, workers or os.cpu_count() or 1) as pool:
@@ -123,27 +136,35 @@ def _searched(
             revision=git_revision(),
             progress=lambda law, best: steps[law].best(best),
             more=tasks.origin,
+            laws=laws,
         )
-        trials = held_out_trials(gains, repeats, tasks.names)
+        pairs = pairs_of(laws)
+        run = tuple(dict.fromkeys(law for pair in pairs for law in pair))
+        trials = held_out_trials(gains, repeats, tasks.names, run)
         step = stage("held-out tape", len(trials))
-        verdict = judge(trials, journal.make(trials, pool.map, step.advance))
-    return with_verdict(gains, verdict), verdict
+        figures = journal.make(trials, pool.map, step.advance)
+    verdicts = [judge(trials, figures, pair) for pair in pairs]
+    for verdict in verdicts[::-1]:
+        gains = with_verdict(gains, verdict)
+    return gains, verdicts
 
 
-def _print(out: Path, gains: Gains, verdict: Verdict) -> None:
+def _print(out: Path, gains: Gains, laws: Sequence[str], verdicts: Sequence[Verdict]) -> None:
     """Write what was found and how it was judged to stdout."""
     from rich.console import Console
 
-    from hil.study.tune import SEARCH, near_bounds
+    from hil.study.tune import near_bounds
 
     console = Console(highlight=False)
-    for law in SEARCH:
+    for law in laws:
         cost, start = gains.origin[f"cost_{law}"], gains.origin[f"start_cost_{law}"]
         console.print(f"{law}: cost {cost}, {start} at the start")
-    console.print(_table(verdict))
-    for line in near_bounds(gains):
+    for verdict in verdicts:
+        console.print(_table(verdict))
+    for line in near_bounds(gains, laws):
         console.print(f"[yellow]note:[/yellow] at the edge of the search: {line}")
-    for law, count in verdict.failed.items():
+    failed = {law: count for verdict in verdicts for law, count in verdict.failed.items()}
+    for law, count in failed.items():
         if count:
             console.print(f"[yellow]note:[/yellow] {law}: {count} runs failed")
     click.echo(f"gain set: {visible(str(out))}")
@@ -158,7 +179,7 @@ def _table(verdict: Verdict) -> Table:
 
     seeds = f"seeds {verdict.seeds[0]} to {verdict.seeds[-1]}"
     table = Table(
-        title=f"asg-ism - pid, held-out {seeds}, 95 % intervals",
+        title=f"{verdict.title}, held-out {seeds}, 95 % intervals",
         title_justify="left",
         show_lines=True,
     )

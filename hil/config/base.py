@@ -99,14 +99,13 @@ class OpenSection(Section):
 
 
 def known_name(registry: Registry) -> AfterValidator:
-    """Return the check that a name, or a file, is one that a registry has."""
+    """Return the check that a name, or a file, is one that a registry has: a file becomes its name."""
 
     def check(name: str) -> str:
         try:
-            registry.get(name)
+            return registry.get(name).name
         except BadInput as error:
             raise ValueError(str(error)) from None
-        return name
 
     return AfterValidator(check)
 

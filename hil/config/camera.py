@@ -7,11 +7,19 @@ pixel value is its reflectance times the local light. DN is the sensor's 8-bit s
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import (
+    BaseModel,
+    Field,
+    SerializeAsAny,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from hil.config.base import Section, known_name, quantity
+from hil.config.own_settings import BY_NAME_KEY, own_of, validated
 from hil.core.registries import LOCALISERS
 
 Reflectance = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -286,11 +294,24 @@ class CameraConfig(Section):
     localiser: Annotated[str, known_name(LOCALISERS)] = Field(
         "marks", description="what finds the robot: marks, tags, or a file"
     )
+    localiser_settings: SerializeAsAny[BaseModel] = Field(
+        default_factory=dict, validate_default=True, description="values of the localiser's own"
+    )
     lens: LensConfig = LensConfig()
     pose: CameraPoseConfig = CameraPoseConfig()
     marks: MarksConfig = MarksConfig()
     robot_look: RobotLookConfig = RobotLookConfig()
     scene: SceneConfig = SceneConfig()
+
+    @field_validator("localiser_settings", mode="plain")
+    @classmethod
+    def _of_the_localiser(cls, table: Any, info: ValidationInfo) -> BaseModel:
+        return validated(BY_NAME_KEY["camera.localiser"], table, info)
+
+    @property
+    def own_settings(self) -> Any:
+        """Return the settings of the localiser's own, None where it has none."""
+        return own_of(self.localiser_settings)
 
     @property
     def tag(self) -> TagConfig | None:

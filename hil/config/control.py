@@ -4,11 +4,21 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import (
+    BaseModel,
+    Field,
+    SerializeAsAny,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from hil.config.base import OpenSection, Section, known_name, quantity
 from hil.config.gains import Gains, GainSets
+from hil.config.own_settings import BY_NAME_KEY, own_of, validated
+from hil.core.errors import BadInput
 from hil.core.registries import ESTIMATORS, OUTER_LAWS, REFERENCES
+from hil.core.registry import Entry
 
 GainSetName = Literal["tuned", "thesis"]
 
@@ -119,6 +129,14 @@ class ReferenceConfig(OpenSection):
 
     kind: str = Field(description="kind of reference: a registered name or a file")
 
+    @field_validator("kind")
+    @classmethod
+    def _as_registered(cls, kind: str) -> str:
+        try:
+            return REFERENCES.get(kind).name
+        except BadInput as error:
+            raise ValueError(str(error)) from None
+
     @classmethod
     def model_for(cls, tree: Any) -> type[BaseModel]:
         """Return the model of the kind that a table names; raises BadInput for an unknown one."""
@@ -170,12 +188,25 @@ class ControlConfig(Section):
     rate_hz: float = quantity("Hz", "outer tick; the camera's rate", 30.0, ge=1, le=200)
     outer: OuterLawName = Field("asg-ism", description="outer law")
     estimator: EstimatorName = Field("fused", description="state estimator")
+    estimator_settings: SerializeAsAny[BaseModel] = Field(
+        default_factory=dict, validate_default=True, description="values of the estimator's own"
+    )
     limits: OuterLimits = Field(default_factory=OuterLimits, description="restrictions, both laws")
     gain_set: GainSetName = Field("tuned", description="set of gains in use")
     gains: GainSets = Field(default_factory=GainSets.from_files, description="the named sets")
     fusion: EstimatorConfig = Field(
         default_factory=EstimatorConfig, description="what the estimator assumes"
     )
+
+    @field_validator("estimator_settings", mode="plain")
+    @classmethod
+    def _of_the_estimator(cls, table: Any, info: ValidationInfo) -> BaseModel:
+        return validated(BY_NAME_KEY["control.estimator"], table, info)
+
+    def own_settings_of(self, estimator: Entry) -> Any:
+        """Return the settings of an estimator's own, None where they are not those of this one."""
+        own = own_of(self.estimator_settings)
+        return own if estimator.settings and isinstance(own, estimator.settings) else None
 
     @property
     def active_gains(self) -> Gains:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Self
 
 from pydantic import Field, model_validator
@@ -28,6 +29,10 @@ class Deck(Section):
         return self
 
 
-def load_deck(name_or_path: str) -> Deck:
-    """Return a built-in deck or one from a TOML file; raises BadInput."""
-    return build(Deck, read_tree(name_or_path, "decks"), name_or_path)
+def load_deck(name_or_path: str, laws: Sequence[str] = ()) -> Deck:
+    """Return a built-in deck or one from a TOML file; raises BadInput.
+
+    `laws` take the place of its own: names, or files.
+    """
+    tree = read_tree(name_or_path, "decks")
+    return build(Deck, tree | {"laws": list(laws)} if laws else tree, name_or_path)

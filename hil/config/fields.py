@@ -17,6 +17,7 @@ from pydantic_core import PydanticUndefined
 
 from hil.config.base import OpenSection, Section, extra_of
 from hil.config.limits import board_table
+from hil.config.own_settings import model_at
 
 # Tables whose keys are not those of a section: the unit and meaning of every value in them.
 _RATIO = "(ratio)"
@@ -151,6 +152,12 @@ def told(model: type[BaseModel], key: str, tree: Any) -> Told:
         return Told(entry.unit, entry.doc) if entry else Told()
     if issubclass(model, Section) and "mismatch" in model.model_fields and parts[0] == "mismatch":
         return _MISMATCH
+    own = model_at(tree, key)
+    if own is not None and not key.startswith("reference."):
+        table = tree
+        for part in parts[:2]:
+            table = _child(table, part)
+        return told(own[0], own[1], table)
     section: type[BaseModel] | None = model
     field: FieldInfo | None = None
     owner, name, table = section, "", tree

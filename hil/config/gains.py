@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
@@ -16,7 +17,7 @@ from pydantic import (
 from hil.config.base import OpenSection, Section
 from hil.core.files import parse_toml
 from hil.core.registries import OUTER_LAWS
-from hil.core.registry import Entry, SourceText
+from hil.core.registry import Box, Entry, SourceText
 
 _models: dict[tuple[tuple[str, type[BaseModel]], ...], type[Gains]] = {}
 
@@ -48,7 +49,7 @@ class Gains(OpenSection):
         if law.settings is None:
             return None
         known = getattr(self, law.key, None)
-        return law.settings() if known is None else known
+        return getattr(make_gains(self.model_dump()), law.key) if known is None else known
 
     def with_values(self, law: Entry, values: Mapping[str, float]) -> Gains:
         """Return the set with some gains of one law replaced; raises pydantic's ValidationError."""
@@ -70,19 +71,28 @@ def gains_model() -> type[Gains]:
         (entry.key, entry.settings) for entry in OUTER_LAWS.entries() if entry.settings is not None
     )
     if laws not in _models:
+        boxes = {entry.key: entry.search for entry in OUTER_LAWS.entries()}
         fields: dict[str, Any] = {
-            key: (settings, _default(key, settings)) for key, settings in laws
+            key: (settings, _default(key, settings, boxes[key])) for key, settings in laws
         }
         _models[laws] = create_model("GainSet", __base__=Gains, **fields)
     return _models[laws]
 
 
-def _default(key: str, settings: type[BaseModel]) -> Any:
-    """Return how a table may be left out: where every gain has a default."""
+def _default(key: str, settings: type[BaseModel], search: Box) -> Any:
+    """Return how a table may be left out: where every gain has a default, or a start of its search."""
     said = f"gains of {key.replace('_', '-')}"
-    if any(field.is_required() for field in settings.model_fields.values()):
+    needed = [name for name, field in settings.model_fields.items() if field.is_required()]
+    starts = {name: search[name][1] for name in needed if name in search}
+    if len(starts) < len(needed) or key in shipped_laws():
         return Field(description=said)
-    return Field(default_factory=settings, description=said)
+    return Field(default_factory=lambda: settings(**starts), description=said)
+
+
+@functools.cache
+def shipped_laws() -> frozenset[str]:
+    """Return the keys of the laws whose gains ship: their tables are never made up."""
+    return frozenset(key for name in ("tuned", "thesis") for key in read_gain_set(name))
 
 
 def make_gains(tables: Mapping[str, Any]) -> Gains:

@@ -16,6 +16,7 @@ from pydantic import BaseModel, ValidationError
 from hil.config.fields import told
 from hil.config.gains import shipped_gains
 from hil.config.limits import board_defaults, check_board
+from hil.config.own_settings import BY_NAME_KEY, PLACES, model_at, renew
 from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
@@ -65,7 +66,10 @@ def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
     if not overrides:
         return scenario
     tree = scenario.model_dump(mode="json")
-    for text in overrides:
+    # A name first: which settings there are depends on it.
+    for text in sorted(
+        overrides, key=lambda text: text.partition("=")[0].strip() not in BY_NAME_KEY
+    ):
         set_value(tree, text)
     _fill_board(tree)
     changed = build(Scenario, tree, "--set")
@@ -109,12 +113,22 @@ _PLUGIN_KEYS = (
 )  # fmt: skip
 
 
+# Lists of outer laws: of a campaign, of a deck.
+_PLUGIN_LISTS = ("outer", "laws")
+
+
 def _set_files_beside(tree: Tree, folder: Path | None) -> None:
     """Make the path of a law's file and the like, named relative to the scenario's, whole; in place."""
     for table, key in _PLUGIN_KEYS:
         node = tree.get(table)
         if folder is not None and isinstance(node, dict) and is_file_name(str(node.get(key, ""))):
             node[key] = str(folder.resolve() / node[key])
+    for key in _PLUGIN_LISTS:
+        names = tree.get(key)
+        if folder is not None and isinstance(names, list):
+            tree[key] = [
+                str(folder.resolve() / name) if is_file_name(str(name)) else name for name in names
+            ]
 
 
 def _base_kind(base: str, kind: str) -> str:
@@ -188,9 +202,14 @@ def put_value(tree: Tree, key: str, value: Any) -> None:
     """Put a value where the dotted name says, in place; an unknown one is a BadInput."""
     if key in _BY_OPTION:
         raise BadInput(f"--set {key}: an option decides it; use {_BY_OPTION[key]} (or its list)")
+    place = BY_NAME_KEY.get(key)
+    if place is not None and place.registry.get(str(value)).name != _find_value(tree, key):
+        renew(tree, place, value)
     parent, leaf = _find(tree, key)
     if parent is None:
-        names = dotted_names(tree)
+        parent, leaf = _setting_without_default(tree, key)
+    if parent is None:
+        names = [*dotted_names(tree), *_own_names(tree)]
         near = difflib.get_close_matches(key, names, n=3, cutoff=0.5)
         same_end = [
             name for name in names if name.split(".")[-1] == key.rsplit(".", maxsplit=1)[-1]
@@ -218,6 +237,28 @@ def _find(tree: Tree, key: str) -> tuple[Any, Any]:
             return node, index
         node = node[index]
     return None, None
+
+
+def _find_value(tree: Tree, key: str) -> Any:
+    parent, leaf = _find(tree, key)
+    return None if parent is None else parent[leaf]
+
+
+def _setting_without_default(tree: Tree, key: str) -> tuple[Any, Any]:
+    """Return (table, key) of an own setting that has no value yet, or (None, None)."""
+    own = model_at(tree, key)
+    if own is None or own[1] not in own[0].model_fields:
+        return None, None
+    return _find_value(tree, key[: -len(own[1]) - 1]), own[1]
+
+
+def _own_names(tree: Tree) -> list[str]:
+    """Return the dotted name of every own setting of what the tree names, with a value or not."""
+    names = []
+    for place in PLACES:
+        model = place.registry.get(str(_find_value(tree, place.name_key))).settings
+        names += [f"{place.settings_key}.{name}" for name in (model.model_fields if model else ())]
+    return names
 
 
 def _is_index(part: str) -> bool:

@@ -15,6 +15,7 @@ from hil.config.link import LinkConfig
 from hil.config.robot import RobotConfig
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME, require_known
+from hil.core.registries import Sources, adopt_sources, file_sources
 
 
 class StartPose(Section):
@@ -106,3 +107,15 @@ class Scenario(Section):
     safety: SafetyConfig = SafetyConfig()
     disturbances: tuple[Disturbance, ...] = ()
     faults: tuple[Fault, ...] = ()
+
+    def __reduce__(self) -> Any:
+        """Pickle with the texts of what came from files: another process gets to know it by them."""
+        sources = file_sources()
+        if not sources:
+            return super().__reduce__()
+        return _unpickled, (self.model_dump(mode="json"), sources)
+
+
+def _unpickled(tree: dict[str, Any], sources: Sources) -> Scenario:
+    adopt_sources(sources)
+    return Scenario.model_validate(tree)

@@ -6,12 +6,21 @@ below all of them.
 
 from __future__ import annotations
 
-from hil.core.registry import Registry
+from collections.abc import Sequence
 
-OUTER_LAWS = Registry("outer law", "skid_steer_hil.outer_laws", "hil.control.laws")
-ESTIMATORS = Registry("estimator", "skid_steer_hil.estimators", "hil.control.estimators")
-REFERENCES = Registry("reference", "skid_steer_hil.references", "hil.control.references")
-LOCALISERS = Registry("localiser", "skid_steer_hil.localisers", "vision.localisers")
+from hil.core.registry import Registry, SourceText
+
+OUTER_LAWS = Registry(
+    "outer law", "skid_steer_hil.outer_laws", "hil.control.laws", ("reset", "step")
+)
+ESTIMATORS = Registry(
+    "estimator",
+    "skid_steer_hil.estimators",
+    "hil.control.estimators",
+    ("on_wheels", "on_pose", "on_command", "estimate_at"),
+)
+REFERENCES = Registry("reference", "skid_steer_hil.references", "hil.control.references", ("at",))
+LOCALISERS = Registry("localiser", "skid_steer_hil.localisers", "vision.localisers", ("locate",))
 
 # As `hil list` names them.
 BY_PLURAL = {
@@ -21,3 +30,29 @@ BY_PLURAL = {
     "localisers": LOCALISERS,
 }
 BY_KIND = {registry.kind: registry for registry in BY_PLURAL.values()}
+
+# The texts of all things from files, by kind: what another process needs to know the same things.
+Sources = tuple[tuple[str, SourceText], ...]
+
+
+def file_sources() -> Sources:
+    """Return the text of every file that a thing known in this process came from."""
+    found = {
+        (kind, entry.source.path): (kind, entry.source)
+        for kind, registry in BY_KIND.items()
+        for entry in registry.entries()
+        if entry.source is not None
+    }
+    return tuple(found.values())
+
+
+def adopt_sources(sources: Sequence[tuple[str, SourceText]]) -> None:
+    """Make known what the texts define; raises BadInput."""
+    for kind, source in sources:
+        BY_KIND[kind].adopt(source)
+
+
+def source_digests(names: Sequence[str]) -> dict[str, str]:
+    """Return the digest of the text of each outer law among `names` that came from a file."""
+    entries = [OUTER_LAWS.get(name) for name in names]
+    return {entry.name: entry.source.sha256 for entry in entries if entry.source is not None}

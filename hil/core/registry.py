@@ -27,6 +27,8 @@ from hil.core.errors import BadInput
 Thing = TypeVar("Thing", bound=Callable[..., Any])
 # name -> (least, start, largest) of what a search may vary, on a logarithmic scale
 Box = Mapping[str, tuple[float, float, float]]
+# name -> (unit, meaning) of a term that a law gives in its trace and the record keeps
+Terms = Mapping[str, tuple[str, str]]
 
 BUILT_IN = "built in"
 _OWN_PACKAGES = ("hil", "vision", "sim_twin")
@@ -61,6 +63,11 @@ class Entry:
     extra: Mapping[str, Any] = field(default_factory=dict)
 
     @property
+    def trace(self) -> Terms:
+        """Return the terms of its own that a law declared with `trace=`; raises BadInput."""
+        return declared_terms(self)
+
+    @property
     def key(self) -> str:
         """Return the name as a key of a TOML table."""
         return self.name.replace("-", "_")
@@ -69,8 +76,9 @@ class Entry:
 class Registry:
     """All things of one kind. `kind` is how messages call one of them."""
 
-    def __init__(self, kind: str, group: str, home: str) -> None:
+    def __init__(self, kind: str, group: str, home: str, methods: tuple[str, ...] = ()) -> None:
         self.kind = kind
+        self._methods = methods
         self.group = group
         self._home = home
         self._entries: dict[str, Entry] = {}
@@ -231,6 +239,7 @@ class Registry:
         finally:
             self._entries, self._loading = before, loading
         for entry in found:
+            self._require_methods(entry)
             if entry.name in before and before[entry.name].origin != entry.origin:
                 other = before[entry.name].origin
                 raise BadInput(
@@ -239,6 +248,16 @@ class Registry:
                 )
             before[entry.name] = entry
         return found
+
+    def _require_methods(self, entry: Entry) -> None:
+        """Raise BadInput when a class lacks what every thing of this kind must have."""
+        missing = [name for name in self._methods if not hasattr(entry.factory, name)]
+        article = "an" if self.kind[0] in "aeiou" else "a"
+        if isinstance(entry.factory, type) and missing:
+            raise BadInput(
+                f"{self.kind} {entry.name} ({entry.origin}): class {entry.factory.__name__} has no "
+                f"{' and no '.join(missing)}; {article} {self.kind} needs {', '.join(self._methods)}"
+            )
 
     def _find_all_into(self, known: dict[str, Entry]) -> None:
         """Have the built-in things found before a file is run, so that its names are compared."""
@@ -270,6 +289,25 @@ class Registry:
                 f"({', '.join(entry.name for entry in found)}); name one: {source.path.name}:NAME"
             )
         return found[0]
+
+
+def declared_terms(entry: Entry) -> Terms:
+    """Return `trace=` of a registration as it must be: name -> (unit, meaning); raises BadInput."""
+    given = entry.extra.get("trace", {})
+    rows = list(given.items()) if isinstance(given, Mapping) else [("", None)]
+    for name, said in rows:
+        parts = said if isinstance(said, tuple | list) else ()
+        if not (
+            isinstance(name, str)
+            and name.isidentifier()
+            and len(parts) == 2
+            and all(isinstance(part, str) for part in parts)
+        ):
+            raise BadInput(
+                f"{entry.name} ({entry.origin}): trace = {{{name!r}: {said!r}}}: needs names with "
+                'unit and meaning, for example {"offset_m": ("m", "offset from the line, left")}'
+            )
+    return {name: (str(said[0]), str(said[1])) for name, said in rows if said is not None}
 
 
 def is_file_name(name: str) -> bool:

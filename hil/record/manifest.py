@@ -27,7 +27,7 @@ from hil.core.errors import BadInput
 from hil.core.files import replace_file
 from hil.core.registry import Entry
 from hil.record import layout
-from hil.record.schema import SCHEMA_VERSION
+from hil.record.schema import SAMPLE_COLUMNS, SCHEMA_VERSION, Column
 
 Outcome = Literal["running", "complete", "interrupted", "fault"]
 _PACKAGES = ("skid-steer-hil", "numpy", "opencv-python-headless", "pymavlink", "pyarrow", "scipy")
@@ -52,17 +52,21 @@ class Plugin(BaseModel):
     origin: str = Field(description="the package, or the file's path when it ran")
     sha256: str = Field("", description="of the file's text; empty for a package")
     file: str = Field("", description="the text, inside the record's folder")
+    label: str = Field("", description="of a law, in reports")
+    colour: str = Field("", description="of a law, in reports")
     _text: str = PrivateAttr("")
 
     @classmethod
     def of(cls, kind: str, entry: Entry) -> Plugin:
         """Return what the record says of a registry's entry."""
+        look = {"label": entry.label, "colour": entry.colour}
         if entry.source is None:
-            return cls(kind=kind, name=entry.name, origin=entry.origin)
+            return cls(kind=kind, name=entry.name, origin=entry.origin, **look)
         file = f"{layout.PLUGINS}/{kind.replace(' ', '_')}-{entry.source.path.name}"
         plugin = cls(
-            kind=kind, name=entry.name, origin=entry.origin, sha256=entry.source.sha256, file=file
-        )
+            kind=kind, name=entry.name, origin=entry.origin, sha256=entry.source.sha256, file=file,
+            **look,
+        )  # fmt: skip
         plugin._text = entry.source.text
         return plugin
 
@@ -70,6 +74,16 @@ class Plugin(BaseModel):
     def text(self) -> str:
         """Return the text that ran; empty for a package, and for a plug-in read from a manifest."""
         return self._text
+
+
+class TraceTerm(BaseModel):
+    """A column of samples.parquet that the law itself brought along."""
+
+    model_config = ConfigDict(frozen=True)
+
+    name: str
+    unit: str
+    meaning: str
 
 
 class Manifest(BaseModel):
@@ -92,6 +106,9 @@ class Manifest(BaseModel):
     inner: str
     gains: dict[str, Any] = Field(default_factory=dict, description="gains of the laws in use")
     plugins: list[Plugin] = Field(default_factory=list, description="what ran from outside")
+    trace: list[TraceTerm] = Field(
+        default_factory=list, description="the law's own columns, after those of every record"
+    )
     versions: dict[str, str] = Field(default_factory=dict)
     git_revision: str = ""
     dialect_hash: str = ""
@@ -132,6 +149,17 @@ class Manifest(BaseModel):
     def scenario_name(self) -> str:
         """Return the scenario's own name."""
         return str(self.scenario.get("name", ""))
+
+    @property
+    def sample_columns(self) -> tuple[Column, ...]:
+        """Return the columns of samples.parquet: those of every record, then the law's own."""
+        own = (Column(t.name, t.unit, "law", t.meaning, trace_key=t.name) for t in self.trace)
+        return (*SAMPLE_COLUMNS, *own)
+
+    @property
+    def sample_names(self) -> tuple[str, ...]:
+        """Return the names of `sample_columns`."""
+        return tuple(column.name for column in self.sample_columns)
 
 
 def _is_requirement(item: object) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 
 from hil.analysis import metrics
 from hil.record.reader import Event, RunRecord
-from hil.record.schema import FRAME_NAMES, SAMPLE_NAMES
+from hil.record.schema import FRAME_NAMES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,7 +31,7 @@ class RunSink(Protocol):
         """Take the wall time of t_s = 0, before anything that is dated by it."""
 
     def append(self, row: Sequence[float]) -> None:
-        """Take one outer tick in the order of schema.SAMPLE_NAMES."""
+        """Take one outer tick in the order of the manifest's sample_names."""
 
     def frame(self, row: Sequence[float], image: NDArray[np.uint8] | None = None) -> None:
         """Take one camera frame in the order of schema.FRAME_NAMES, and its image."""
@@ -58,7 +58,7 @@ class MemoryRecorder:
         """Leave the manifest's wall time: a replay's is that of its record."""
 
     def append(self, row: Sequence[float]) -> None:
-        """Take one outer tick in the order of schema.SAMPLE_NAMES."""
+        """Take one outer tick in the order of the manifest's sample_names."""
         self.rows.append(row)
 
     def frame(self, row: Sequence[float], image: NDArray[np.uint8] | None = None) -> None:  # noqa: ARG002
@@ -98,7 +98,7 @@ class MemoryRecorder:
         return RunRecord(
             path=Path(),
             manifest=self.manifest.model_copy(update=ended),
-            samples=_columns(SAMPLE_NAMES, self.rows),
+            samples=_columns(self.manifest.sample_names, self.rows),
             frames=_columns(FRAME_NAMES, self.frames),
             events=tuple(self.events),
         )

@@ -15,7 +15,7 @@ from hil.core.errors import BadInput
 from hil.record import layout
 from hil.record.journal import Columns, read_journal, read_parquet
 from hil.record.manifest import Manifest, file_entry, read_manifest
-from hil.record.schema import ADDED_LATER, FRAME_NAMES, SAMPLE_NAMES
+from hil.record.schema import ADDED_LATER, FRAME_NAMES
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +109,7 @@ def read_run(path: Path) -> RunRecord:
     samples = read_table(path, layout.SAMPLES, layout.SAMPLES_JOURNAL, required=True)
     rows = samples["t_s"].size if "t_s" in samples else 0
     samples = {name: np.full(rows, math.nan) for name in ADDED_LATER} | samples
-    missing = [name for name in SAMPLE_NAMES if name not in samples]
+    missing = [name for name in manifest.sample_names if name not in samples]
     if missing:
         raise BadInput(f"{path / layout.SAMPLES}: damaged: column {missing[0]} is missing")
     frames: Columns = {}

@@ -17,7 +17,7 @@ from hil.record.camera import CameraKeeper
 from hil.record.journal import Columns, Journal, read_journal, write_parquet
 from hil.record.manifest import Manifest, Outcome, Plugin, file_entry, write_manifest
 from hil.record.reader import RunRecord, read_events, read_pictures
-from hil.record.schema import FRAME_COLUMNS, FRAME_NAMES, SAMPLE_COLUMNS, SAMPLE_NAMES, Column
+from hil.record.schema import FRAME_COLUMNS, FRAME_NAMES, Column
 from hil.record.tape import TapeWriter
 from hil.record.tlog import TlogWriter
 
@@ -33,7 +33,7 @@ class Recorder:
     """One open run record.
 
     Times are host times in s since the start of the controlled part (negative before it). `append`
-    takes one row of samples in the order of schema.SAMPLE_NAMES and costs a few microseconds; rows,
+    takes one row of samples in the order of the manifest's sample_names and costs a few microseconds; rows,
     frames and events reach the system at least once per second of run time.
     """
 
@@ -53,7 +53,7 @@ class Recorder:
         self._rerun = rerun
         self._claim(out_dir)
         self._keep(plugins)
-        self._samples = Journal(out_dir / layout.SAMPLES_JOURNAL, SAMPLE_NAMES)
+        self._samples = Journal(out_dir / layout.SAMPLES_JOURNAL, manifest.sample_names)
         self._frames = Journal(out_dir / layout.FRAMES_JOURNAL, FRAME_NAMES)
         self._tlog = TlogWriter(out_dir / layout.LINK, manifest.start_unix_us)
         self.tape = TapeWriter(out_dir / layout.TAPE)
@@ -92,7 +92,7 @@ class Recorder:
         write_manifest(self.path, self._manifest)
 
     def append(self, row: Sequence[float]) -> None:
-        """Append one outer tick, values in the order of schema.SAMPLE_NAMES, NaN for unknown."""
+        """Append one outer tick, values in the order of the manifest's sample_names, NaN for unknown."""
         self._write_row(row)
         if row[0] >= self._next_flush_s:
             self._next_flush_s = row[0] + _FLUSH_PERIOD_S
@@ -142,7 +142,8 @@ class Recorder:
     ) -> RunRecord:
         """Finish the record: tables, pictures, figures, Rerun file, and the manifest last."""
         self._stop_writers()
-        samples = self._finish_table(layout.SAMPLES_JOURNAL, layout.SAMPLES, SAMPLE_COLUMNS)
+        columns = self._manifest.sample_columns
+        samples = self._finish_table(layout.SAMPLES_JOURNAL, layout.SAMPLES, columns)
         frames = self._finish_table(layout.FRAMES_JOURNAL, layout.FRAMES, FRAME_COLUMNS)
         stats = link or metrics.LinkStats()
         ended = {

@@ -79,6 +79,24 @@ PLOTS = (
          (("exposure to actuation", "exposure_to_actuation_s", 1e3),
           ("camera", "camera_latency_s", 1e3), ("round trip", "rtt_s", 1e3))),
 )  # fmt: skip
+_OWN_PLOT_LINES = 4
+
+
+def own_plots(run: RunRecord) -> tuple[Plot, ...]:
+    """Return a chart for each unit of the law's own columns; of many terms, several charts."""
+    by_unit: dict[str, list[str]] = {}
+    for term in run.manifest.trace:
+        by_unit.setdefault(term.unit, []).append(term.name)
+    plots = []
+    for unit, names in by_unit.items():
+        for i in range(0, len(names), _OWN_PLOT_LINES):
+            some = names[i : i + _OWN_PLOT_LINES]
+            title = f"{run.manifest.outer}: {', '.join(some)}{f' ({unit})' if unit else ''}"
+            key = f"law/{some[0]}"
+            plots.append(Plot(key, title, tuple((name, name, 1.0) for name in some)))
+    return tuple(plots)
+
+
 _MAIN_PLOTS = ("error", "sliding", "wheels", "latency")
 
 
@@ -160,7 +178,7 @@ class _Sender:
             x_m, y_m = metrics.error_components(samples)
             norm_m = np.hypot(x_m, y_m)
             derived = {"error_x_m": x_m, "error_y_m": y_m, "error_norm_m": norm_m}
-            for plot in PLOTS:
+            for plot in (*PLOTS, *own_plots(self._run)):
                 self._plot(plot, samples | derived, style)
         if self._run.pictures:
             self._camera()
@@ -255,9 +273,11 @@ def blueprint(runs: Sequence[RunRecord], names: Sequence[str]) -> rrb.Blueprint:
         for name, run in zip(names, runs, strict=True)
         if run.pictures
     ]
-    charts = {plot.key: _chart(plot, names) for plot in PLOTS}
+    own = {plot.key: plot for run in runs for plot in own_plots(run)}
+    plots = (*PLOTS, *own.values())
+    charts = {plot.key: _chart(plot, names) for plot in plots}
     main = rrb.Vertical(*[charts[key] for key in _MAIN_PLOTS], name="Main")
-    more = [charts[plot.key] for plot in PLOTS if plot.key not in _MAIN_PLOTS]
+    more = [charts[plot.key] for plot in plots if plot.key not in _MAIN_PLOTS]
     events = rrb.TextLogView(name="Events", contents=[f"+ /{name}/events" for name in names])
     left: list[rrb.View | rrb.Container] = [floor]
     if cameras:

@@ -11,7 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
+
+from hil.core.errors import BadInput
+
+if TYPE_CHECKING:
+    from hil.core.registry import Entry
 
 SCHEMA_VERSION = 1
 
@@ -117,6 +122,21 @@ ADDED_LATER = ("pose_accepted",)
 SAMPLE_NAMES = tuple(column.name for column in SAMPLE_COLUMNS)
 FRAME_NAMES = tuple(column.name for column in FRAME_COLUMNS)
 _TRACE_KEYS = tuple(column.trace_key for column in LAW_COLUMNS)
+
+
+def own_columns(law: Entry) -> tuple[Column, ...]:
+    """Return the columns that a law adds with `trace=`; raises BadInput for a name that is taken."""
+    taken = {*SAMPLE_NAMES, *_TRACE_KEYS}
+    for name in law.trace:
+        if name in taken:
+            raise BadInput(
+                f"law {law.name} ({law.origin}): trace name {name!r} is that of a column that every "
+                "record has; name it otherwise"
+            )
+    return tuple(
+        Column(name, unit, "law", meaning, trace_key=name)
+        for name, (unit, meaning) in law.trace.items()
+    )
 
 
 def trace_row(trace: Mapping[str, float]) -> tuple[float, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from hil.record.schema import trace_row
@@ -30,11 +31,13 @@ def sample_row(
     latency: tuple[float, float, float, float, float],
     link: BoardLink,
     late: bool,
+    own_terms: Sequence[str] = (),
 ) -> tuple[float, ...]:
     """Return one outer tick in the order of schema.SAMPLE_NAMES; NaN for what is not known.
 
     `latency` is (pose seen since the last tick, pose accepted since then, quality of the newest,
-    exposure to host in s, exposure to actuation in s).
+    exposure to host in s, exposure to actuation in s). The terms of the trace named in `own_terms` follow, in
+    their order.
     """
     return (
         t_s,
@@ -54,6 +57,7 @@ def sample_row(
         link.clock.sigma_s,
         link.counters.lost,
         late,
+        *[command.trace.get(name, _NAN) for name in own_terms],
     )
 
 

@@ -20,12 +20,12 @@ from hil.core.registries import OUTER_LAWS
 from hil.core.types import Estimate, OuterCommand, OuterLaw, ReferenceState
 from hil.record import layout
 from hil.record.memory import MemoryRecorder
-from hil.record.schema import ADDED_LATER, FRAME_NAMES, SAMPLE_NAMES
+from hil.record.schema import ADDED_LATER, FRAME_NAMES, SAMPLE_COLUMNS, SAMPLE_NAMES, Column
 from hil.record.source import Source, load_plugins, read_source, recorded_scenario
 from hil.record.tlog import LoggedFrame
 from hil.replays.divergence import Channel, compare_columns, compare_link
 from hil.rigs.replay import HAPPENED, open_replay
-from hil.runs.execute import RunSpec, board_parameters, make_parts
+from hil.runs.execute import RunSpec, board_parameters, make_parts, trace_terms
 from hil.runs.session import Ending, Session
 from hil.wire.identity import board_hashes
 
@@ -60,6 +60,7 @@ class ReplayReport:
     channels: tuple[Channel, ...]
     problems: tuple[str, ...]
     samples: Columns
+    columns: tuple[Column, ...] = SAMPLE_COLUMNS
 
     @property
     def identical(self) -> bool:
@@ -110,15 +111,17 @@ def replay(
     """
     source = read_source(path)
     load_plugins(source, recorded_code=recorded_code)
+    law = OUTER_LAWS.get(outer).name if outer else source.manifest.outer
     recorded = recorded_scenario(source.manifest, path)
     scenario = _changed(recorded, overrides)
-    law = OUTER_LAWS.get(outer).name if outer else source.manifest.outer
     kind: Kind = "shadow" if overrides or law != source.manifest.outer else "exact"
     spec = RunSpec(
         scenario, source.manifest.target, source.manifest.camera, law, source.manifest.inner,
         source.manifest.seed, path,
     )  # fmt: skip
-    recorder = MemoryRecorder(source.manifest, keep_link=True)
+    # A shadow's rows have the columns of its own law.
+    terms = trace_terms(OUTER_LAWS.get(law))
+    recorder = MemoryRecorder(source.manifest.model_copy(update={"trace": terms}), keep_link=True)
     rig = open_replay(source, recorded)
     parts = make_parts(spec, rig, recorder)
     shadow = Shadow(parts.law, source.samples) if kind == "shadow" else None
@@ -149,6 +152,7 @@ def replay(
         channels=tuple(_channels(source, samples, record.frames, stamps)),
         problems=source.problems,
         samples=samples,
+        columns=recorder.manifest.sample_columns,
     )
 
 
@@ -203,6 +207,7 @@ def _channels(
     if source.samples:
         there = [name for name in SAMPLE_NAMES if name in source.samples or name not in ADDED_LATER]
         names = [name for name in there if name not in _GIVEN]
+        names += [term.name for term in source.manifest.trace if term.name in samples]
         found += compare_columns(source.samples, samples, names, source.samples["t_s"])
     if source.frames:
         dated = source.frames["t_arrival_s"]

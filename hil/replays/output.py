@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 from hil.core.errors import BadInput
 from hil.core.files import replace_file
 from hil.record.journal import write_parquet
-from hil.record.schema import SAMPLE_COLUMNS
 
 if TYPE_CHECKING:
     from hil.replays.exact import ReplayReport
@@ -31,5 +30,5 @@ def claim_folder(folder: Path) -> None:
 def write_output(folder: Path, report: ReplayReport, document: dict[str, Any]) -> None:
     """Write `document` as replay.json, and replayed.parquet (columns as in samples.parquet)."""
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
-    write_parquet(folder / "replayed.parquet", report.samples, SAMPLE_COLUMNS)
+    write_parquet(folder / "replayed.parquet", report.samples, report.columns)
     replace_file(folder / "replay.json", text.encode() + b"\n")

@@ -18,6 +18,7 @@ from hil.config.load import with_overrides
 from hil.config.scenario import Scenario, StartPose
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME
+from hil.core.registries import OUTER_LAWS
 from hil.record.source import load_plugins, read_source, recorded_scenario
 from hil.replays.fit import UNITS, Fit, Rehearsal, fit_twin
 from hil.report.compare import HEADLINES
@@ -147,7 +148,7 @@ def _other_law(
     if outer is None and inner is None and not overrides:
         others = [law for law in _USUAL if law != manifest.outer]
         return others[0], manifest.inner
-    found = (outer or manifest.outer, inner or manifest.inner)
+    found = (OUTER_LAWS.get(outer or manifest.outer).name, inner or manifest.inner)
     if found == (manifest.outer, manifest.inner) and not overrides:
         raise BadInput(
             f"--fit: {_options(manifest)} is the recorded law itself, a comparison with itself says "

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -89,7 +89,7 @@ def traces(entries: Sequence[Entry]) -> list[Trace]:
     Runs of one law then share colour and label, so that a legend has one line for all of them.
     """
     laws = [entry.run.manifest.outer for entry in entries]
-    colours = law_colours(laws)
+    colours = law_colours(laws, own_colours(entries))
     by_law = len(colours) > 1
     return [
         Trace(
@@ -101,10 +101,21 @@ def traces(entries: Sequence[Entry]) -> list[Trace]:
     ]
 
 
-def law_colours(laws: Sequence[str]) -> dict[str, int]:
+def own_colours(entries: Sequence[Entry]) -> dict[str, str]:
+    """Return the colour of each law as it registered itself: known here, or kept in its record."""
+    kept = {
+        plugin.name: plugin.colour
+        for entry in entries
+        for plugin in entry.run.manifest.plugins
+        if plugin.kind == OUTER_LAWS.kind
+    }
+    return kept | {law.name: law.colour for law in OUTER_LAWS.entries()}
+
+
+def law_colours(laws: Sequence[str], colours: Mapping[str, str]) -> dict[str, int]:
     """Return a place in RUNS for each law: its own colour's where it has one, else the next free."""
     names = list(dict.fromkeys(laws))
-    own = {entry.name: entry.colour.lower() for entry in OUTER_LAWS.entries()}
+    own = {name: colour.lower() for name, colour in colours.items()}
     taken: dict[str, int] = {}
     for name in names:
         if own.get(name) in RUNS and RUNS.index(own[name]) not in taken.values():

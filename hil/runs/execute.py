@@ -24,9 +24,10 @@ from hil.control.task_notes import notes
 from hil.core.clocks import CameraClock
 from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES
 from hil.core.registry import BUILT_IN
-from hil.record.manifest import Manifest, Plugin, collect_versions, git_revision
+from hil.record.manifest import Manifest, Plugin, TraceTerm, collect_versions, git_revision
 from hil.record.memory import MemoryRecorder
 from hil.record.recorder import Recorder
+from hil.record.schema import own_columns
 from hil.record.tape import TapedRig
 from hil.record.timeline import Timeline
 from hil.rigs.opening import REPLAY, SIMULATED, open_rig
@@ -35,9 +36,11 @@ from hil.runs.law_guard import GuardedLaw
 from hil.runs.session import Parts, Progress, Publish, Session
 from hil.wire.identity import board_hashes
 from hil.wire.link import BoardLink
+from vision.localisers.making import make_localiser
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
+    from hil.core.registry import Entry
     from hil.core.rig import Rig
     from hil.core.types import OuterLaw
     from hil.record.memory import RunSink
@@ -137,14 +140,17 @@ def execute(
         rig.close()
 
 
-def execute_in_memory(spec: RunSpec, rig: Rig | None = None) -> RunRecord:
+def execute_in_memory(
+    spec: RunSpec, rig: Rig | None = None, law: OuterLaw | None = None
+) -> RunRecord:
     """Run the spec and return what a record would hold, without writing one (spec.out is unused).
 
-    `rig` is another one than the spec's target names; it is closed here.
+    `rig` is another one than the spec's target names; it is closed here. `law` is another one than a
+    new one of the spec.
     """
     check_fit(spec.scenario)
     parameters = board_parameters(spec.scenario, spec.inner)
-    law = make_law(spec)
+    law = law or make_law(spec)
     rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
     try:
         recorder = MemoryRecorder(make_manifest(spec))
@@ -202,13 +208,14 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
         rig=rig,
         link=BoardLink(rig.stream, timeline.link_frame),
         camera_clock=CameraClock(scenario.camera.latency_s),
-        localiser=LOCALISERS.get(scenario.camera.localiser).factory(scenario.camera),
-        estimator=make_estimator(control.estimator, control.fusion, geometry),
+        localiser=make_localiser(scenario.camera),
+        estimator=make_estimator(control.estimator, control, geometry),
         law=WithinWheelSpeed(law or make_law(spec), geometry, wheel_speed_max_rad_s(scenario)),
         reference=make_reference(scenario.reference),
         geometry=geometry,
         recorder=recorder,
         timeline=timeline,
+        own_terms=tuple(OUTER_LAWS.get(spec.outer).trace),
     )
 
 
@@ -231,6 +238,7 @@ def make_manifest(spec: RunSpec) -> Manifest:
             "board": board_parameters(spec.scenario, spec.inner),
         },
         plugins=plugins_of(spec),
+        trace=trace_terms(law),
         open_loop_of=spec.target.removeprefix(REPLAY) if spec.target.startswith(REPLAY) else "",
         notes=notes(spec.scenario),
         versions=collect_versions(),
@@ -238,6 +246,14 @@ def make_manifest(spec: RunSpec) -> Manifest:
         start_time_utc=datetime.fromtimestamp(now_us * 1e-6, UTC).isoformat(timespec="seconds"),
         start_unix_us=now_us,
     )
+
+
+def trace_terms(law: Entry) -> list[TraceTerm]:
+    """Return the columns that a law brings along, for a manifest; raises BadInput."""
+    return [
+        TraceTerm(name=column.name, unit=column.unit, meaning=column.meaning)
+        for column in own_columns(law)
+    ]
 
 
 def _unix_us() -> int:

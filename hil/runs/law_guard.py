@@ -12,10 +12,12 @@ import math
 import signal
 import threading
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
 
 from hil.core.errors import HilError, RigFault
 from hil.core.registry import in_one_line
@@ -34,8 +36,8 @@ STEP_MAX_S = 0.2
 _EXCESS = 1.0 + 1e-9
 
 
-class _TooLongError(Exception):
-    """The law's time is up."""
+class TooLongError(Exception):
+    """The time of a call is up."""
 
 
 class GuardedLaw:
@@ -59,7 +61,16 @@ class GuardedLaw:
         self._check(
             "theta_dot_rad_s", command.theta_dot_rad_s, self._limits.theta_dot_max_rad_s, "rad/s"
         )
+        self._check_trace(command.trace)
         return command
+
+    def _check_trace(self, trace: object) -> None:
+        """Refuse a trace that the record could not hold; NaN stands for "does not exist"."""
+        if not isinstance(trace, Mapping):
+            raise self._fault(f"step returned a trace that is {type(trace).__name__}, not a dict")
+        for name, value in trace.items():
+            if not isinstance(value, int | float | np.number | np.bool_):
+                raise self._fault(f"step returned trace[{name!r}] = {value!r}, not a number")
 
     def _check(self, name: str, value: float, limit: float, unit: str) -> None:
         try:
@@ -75,11 +86,11 @@ class GuardedLaw:
 
     def _call(self, what: str, function: Callable[[], Result]) -> Result:
         try:
-            with _time_limit(STEP_MAX_S):
+            with time_limit(STEP_MAX_S):
                 return function()
         except HilError:
             raise
-        except _TooLongError as error:
+        except TooLongError as error:
             raise self._fault(f"{what} took longer than {STEP_MAX_S:g} s", error) from None
         except Exception as error:
             raise self._fault(f"{what} raised {in_one_line(error)}", error) from None
@@ -96,8 +107,8 @@ class GuardedLaw:
 
 
 @contextmanager
-def _time_limit(seconds: float) -> Iterator[None]:
-    """Raise _TooLongError in the body after `seconds`, where the system can (main thread, not Windows)."""
+def time_limit(seconds: float) -> Iterator[None]:
+    """Raise TooLongError in the body after `seconds`, where the system can (main thread, not Windows)."""
     if (
         not hasattr(signal, "setitimer")
         or threading.current_thread() is not threading.main_thread()
@@ -106,7 +117,7 @@ def _time_limit(seconds: float) -> Iterator[None]:
         return
 
     def ring(_number: int, _frame: FrameType | None) -> None:
-        raise _TooLongError
+        raise TooLongError
 
     before = signal.signal(signal.SIGALRM, ring)
     signal.setitimer(signal.ITIMER_REAL, seconds)

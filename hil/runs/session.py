@@ -60,6 +60,7 @@ class Parts:
     geometry: BelievedGeometry
     recorder: RunSink
     timeline: Timeline
+    own_terms: tuple[str, ...] = ()  # of the law's trace, kept in columns of their own
 
 
 @dataclass(frozen=True, slots=True)
@@ -378,6 +379,7 @@ class Session:
                 ),
                 link=link,
                 late=late,
+                own_terms=parts.own_terms,
             )
         )
         self._seen = self._accepted = False

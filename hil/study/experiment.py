@@ -15,6 +15,7 @@ from hil.config.fit import check_fit
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput
 from hil.core.files import replace_file
+from hil.core.registries import source_digests
 from hil.record.manifest import Manifest
 from hil.report.circle import CircleStudy
 from hil.report.compare import compare_runs, refuse_other_task, to_json
@@ -162,7 +163,7 @@ def _identity(spec: RunSpec) -> dict[str, Any]:
         "inner": spec.inner,
         "seed": spec.seed,
         "folder": spec.out.name,
-    }
+    } | ({"texts": texts} if (texts := source_digests([spec.outer])) else {})
 
 
 def _refuse_other_plan(

@@ -1,4 +1,4 @@
-"""The gain procedure: one search, one cost and one budget for both outer laws (docs/control.md).
+"""The gain procedure: one search, one cost and one budget for every outer law (docs/control.md).
 
 The caller says how runs are made (`evaluate`), so the procedure works on any target. Gains are
 searched on a logarithmic scale by CMA-ES; every candidate of both laws sees the same cases and
@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from hil.config.control import PointReference
 from hil.config.events import Disturbance
 from hil.config.load import load_robot, load_scenario
+from hil.core.errors import BadInput
 from hil.core.files import replace_file
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import Box
@@ -47,8 +48,30 @@ COST_WEIGHTS = {
 # Cost of a run that gives no figure: a safety stop, a law that diverged, never within 20 mm.
 COST_FAILED = 20.0
 
-# What is searched of each law that is compared, as the law declares it.
-SEARCH: dict[str, Box] = {name: OUTER_LAWS.get(name).search for name in ("asg-ism", "pid")}
+
+def boxes_of(laws: Sequence[str]) -> dict[str, Box]:
+    """Return what is searched of each law, as the law declares it; raises BadInput for one without."""
+    boxes = {}
+    for law in laws:
+        entry = OUTER_LAWS.get(law)
+        keys = entry.settings.model_fields if entry.settings is not None else {}
+        if not entry.search:
+            raise BadInput(
+                f"law {entry.name} ({entry.origin}): declares no search box, so there is nothing to "
+                'tune; give search={"KEY": (least, start, largest)} where it is registered'
+            )
+        for key, box in entry.search.items():
+            if key not in keys or not 0.0 < box[0] <= box[1] <= box[2] or box[0] == box[2]:
+                raise BadInput(
+                    f"law {entry.name} ({entry.origin}): search[{key!r}] = {tuple(box)}: needs a key of "
+                    "its settings with 0 < least <= start <= largest"
+                )
+        boxes[entry.name] = entry.search
+    return boxes
+
+
+# The laws that are compared unless others are named, and what is searched of them.
+SEARCH: dict[str, Box] = boxes_of(("asg-ism", "pid"))
 
 
 # What pushes the robot in a pushed case: a tenth of the robot's weight along its
@@ -207,7 +230,7 @@ def search(
 ) -> Found:
     """Return the best gains of `outer` within the plan's budget; deterministic by its seeds."""
     return minimise(
-        SEARCH[outer],
+        boxes_of([outer])[outer],
         lambda tried: candidate_costs(
             outer, [with_values(base, outer, values) for values in tried], evaluate, plan
         ),
@@ -227,8 +250,9 @@ def tune(
     revision: str,
     progress: Callable[[str, float], None] | None = None,
     more: Mapping[str, str] | None = None,
+    laws: Sequence[str] = tuple(SEARCH),
 ) -> Gains:
-    """Return the tuned gains of both laws with their origin; `base` holds what is not searched.
+    """Return the tuned gains of the laws with their origin; `base` holds what is not searched.
 
     `more` goes into the origin.
 
@@ -239,15 +263,15 @@ def tune(
         told = (lambda _done, best: progress(outer, best)) if progress else None
         return search(outer, base, evaluate, plan, told)
 
-    found = {outer: searched(outer) for outer in SEARCH}
+    found = {outer: searched(outer) for outer in laws}
     gains = with_origin(base, found, plan, target=target, revision=revision)
     return gains.model_copy(update={"origin": gains.origin | dict(more or {})})
 
 
-def near_bounds(gains: Gains) -> list[str]:
+def near_bounds(gains: Gains, laws: Sequence[str] = tuple(SEARCH)) -> list[str]:
     """Return what lies within 3 % of the way to an edge of its search box, where the box decided."""
     found = []
-    for outer, box in SEARCH.items():
+    for outer, box in boxes_of(laws).items():
         values = gains.of(OUTER_LAWS.get(outer)).model_dump()
         for name, (low, _, high) in box.items():
             at = math.log(values[name] / low) / math.log(high / low)

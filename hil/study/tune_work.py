@@ -23,7 +23,18 @@ from hil.config.gains import Gains
 from hil.config.load import build, builtin_names, load_robot, load_scenario
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
-from hil.study.tune import CASES, COST_WEIGHTS, SEARCH, Case, Figures, Plan, Trial, Variant
+from hil.core.registries import source_digests
+from hil.study.tune import (
+    CASES,
+    COST_WEIGHTS,
+    SEARCH,
+    Case,
+    Figures,
+    Plan,
+    Trial,
+    Variant,
+    boxes_of,
+)
 from hil.study.tuning_verdict import ALL_SCENARIOS, HELD_OUT_SCENARIOS, JUDGED
 
 _FORMAT = "hil-tune-1"
@@ -203,9 +214,17 @@ class Journal:
         self.path.unlink(missing_ok=True)
 
 
-def identity_of(tasks: Tasks, plan: Plan, camera: str, program: str) -> dict[str, Any]:
+def identity_of(
+    tasks: Tasks, plan: Plan, camera: str, program: str, laws: Sequence[str] = tuple(SEARCH)
+) -> dict[str, Any]:
     """Return what decides the runs of a search; a larger budget is the same search gone on with."""
-    searched = {"boxes": SEARCH, "cost": COST_WEIGHTS, "cases": [str(c) for c in plan.cases]}
+    searched: dict[str, Any] = {
+        "boxes": boxes_of(laws),
+        "cost": COST_WEIGHTS,
+        "cases": [str(c) for c in plan.cases],
+    }
+    texts = source_digests(laws)
+    searched |= {"texts": texts} if texts else {}
     return {
         "camera": camera,
         "seed": plan.search_seed,

@@ -1,4 +1,4 @@
-"""The verdict on tuned gains: both laws on seeds that no candidate has seen, pair by pair."""
+"""The verdict on tuned gains: two laws on seeds that no candidate has seen, pair by pair."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from hil.analysis.stats import Paired, paired
-from hil.study.tune import SEARCH, Case, Figures, Trial, run_cost
+from hil.study.tune import Case, Figures, Trial, run_cost
 
 if TYPE_CHECKING:
     from hil.config.gains import Gains
@@ -29,9 +29,14 @@ JUDGED = (
 )
 
 
+# A law, and the one that is subtracted from it.
+Pair = tuple[str, str]
+USUAL: Pair = ("asg-ism", "pid")
+
+
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """ASG-ISM - PID on held-out seeds: by scenario (and over all of them), by figure.
+    """One law minus another on held-out seeds: by scenario (and over all of them), by figure.
 
     `failed` counts each law's runs without figures; their pairs cost COST_FAILED and are left out
     of the other figures.
@@ -40,13 +45,19 @@ class Verdict:
     seeds: tuple[int, ...]
     differences: dict[str, dict[str, Paired]]
     failed: dict[str, int]
+    pair: Pair = USUAL
+
+    @property
+    def title(self) -> str:
+        """Return which law is set against which."""
+        return " - ".join(self.pair)
 
     def to_json(self) -> dict[str, Any]:
         """Return the verdict for a JSON document."""
         return {
             "seeds": list(self.seeds),
             "failed": self.failed,
-            "asg-ism - pid": {
+            self.title: {
                 scenario: {name: result.to_json() for name, result in table.items()}
                 for scenario, table in self.differences.items()
             },
@@ -54,21 +65,39 @@ class Verdict:
 
 
 def held_out_trials(
-    gains: Gains, repeats: int, scenarios: Sequence[str] = HELD_OUT_SCENARIOS
+    gains: Gains,
+    repeats: int,
+    scenarios: Sequence[str] = HELD_OUT_SCENARIOS,
+    laws: Sequence[str] = USUAL,
 ) -> list[Trial]:
-    """Return the runs of the held-out tape, both laws with equal seeds."""
+    """Return the runs of the held-out tape, all laws with equal seeds."""
     return [
         Trial(outer, gains, Case(scenario, "calm", "asg-ism"), seed)
         for seed in range(HELD_OUT_SEED, HELD_OUT_SEED + repeats)
         for scenario in scenarios
-        for outer in SEARCH
+        for outer in laws
     ]
 
 
-def judge(trials: Sequence[Trial], figures: Sequence[Figures]) -> Verdict:
-    """Return the verdict on the runs of a held-out tape."""
+def pairs_of(tuned: Sequence[str]) -> list[Pair]:
+    """Return which laws are set against which: the tuned ones, and each of them against the built-in."""
+    if set(tuned) == set(USUAL):
+        return [USUAL]
+    found: list[Pair] = []
+    for law in tuned:
+        for other in (*USUAL[::-1], *tuned):
+            if other != law and (other, law) not in found and (law, other) not in found:
+                found.append((law, other))
+    return found
+
+
+def judge(trials: Sequence[Trial], figures: Sequence[Figures], pair: Pair = USUAL) -> Verdict:
+    """Return the verdict on the runs of a held-out tape; runs of other laws are left aside."""
+    law, other = pair
+    own = [place for place, trial in enumerate(trials) if trial.outer in pair]
+    trials, figures = [trials[place] for place in own], [figures[place] for place in own]
     values: dict[str, dict[str, dict[str, list[float]]]] = {
-        scenario: {name: {outer: [] for outer in SEARCH} for name in JUDGED}
+        scenario: {name: {outer: [] for outer in pair} for name in JUDGED}
         for scenario in (ALL_SCENARIOS, *dict.fromkeys(trial.case.scenario for trial in trials))
     }
     # The scenarios share their seeds: over all of them it is the seeds that were drawn.
@@ -76,7 +105,7 @@ def judge(trials: Sequence[Trial], figures: Sequence[Figures]) -> Verdict:
         scenario: [
             (trial.seed, 0)
             for trial in trials
-            if trial.outer == "pid" and scenario in {ALL_SCENARIOS, trial.case.scenario}
+            if trial.outer == other and scenario in {ALL_SCENARIOS, trial.case.scenario}
         ]
         for scenario in values
     }
@@ -89,7 +118,7 @@ def judge(trials: Sequence[Trial], figures: Sequence[Figures]) -> Verdict:
         seeds=tuple(dict.fromkeys(trial.seed for trial in trials)),
         differences={
             scenario: {
-                name: paired(by_law["pid"], by_law["asg-ism"], tapes[scenario])
+                name: paired(by_law[other], by_law[law], tapes[scenario])
                 for name, by_law in table.items()
             }
             for scenario, table in values.items()
@@ -99,8 +128,9 @@ def judge(trials: Sequence[Trial], figures: Sequence[Figures]) -> Verdict:
                 not found for trial, found in zip(trials, figures, strict=True)
                 if trial.outer == outer
             )
-            for outer in SEARCH
+            for outer in pair
         },
+        pair=pair,
     )  # fmt: skip
 
 
@@ -110,8 +140,8 @@ def with_verdict(gains: Gains, verdict: Verdict) -> Gains:
     judged = [name for name in verdict.differences if name != ALL_SCENARIOS]
     told: dict[str, str | int | float] = {
         "held_out": f"{', '.join(judged)}, seeds {verdict.seeds[0]} to {verdict.seeds[-1]}",
-        "held_out_cost_pid": round(cost.baseline_mean, 4),
-        "held_out_cost_asg-ism": round(cost.other_mean, 4),
+        f"held_out_cost_{verdict.pair[1]}": round(cost.baseline_mean, 4),
+        f"held_out_cost_{verdict.pair[0]}": round(cost.other_mean, 4),
         "held_out_cost_difference": f"{cost.mean:.4f}, 95 % {cost.interval.low:.4f} to "
         f"{cost.interval.high:.4f}",
     }

@@ -23,6 +23,7 @@ from hil.config.load import build, load_scenario, put_value, read_tree
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME, Metric, require_known
+from hil.core.registries import Sources, adopt_sources, file_sources, source_digests
 
 Point = dict[str, Any]
 # Share of a normal distribution that has to lie within its bounds: draws outside are drawn again.
@@ -207,10 +208,15 @@ class Campaign:
     file: CampaignFile
     base: dict[str, Any]
 
+    def __reduce__(self) -> Any:
+        """Pickle with the texts of what came from files: a worker gets to know it by them."""
+        return _unpickled, (self.file.model_dump(mode="json"), self.base, file_sources())
+
     @property
     def digest(self) -> str:
         """Return what two campaigns share exactly when their runs are the same."""
         tree = {"file": self.file.model_dump(mode="json"), "base": self.base}
+        tree |= {"texts": texts} if (texts := source_digests(self.file.outer)) else {}
         return hashlib.sha256(json.dumps(tree, sort_keys=True).encode()).hexdigest()
 
     @property
@@ -257,6 +263,11 @@ class Campaign:
         scenario = build(Scenario, tree, self.file.name)
         check_board(scenario.board)
         return scenario
+
+
+def _unpickled(file: dict[str, Any], base: dict[str, Any], sources: Sources) -> Campaign:
+    adopt_sources(sources)
+    return Campaign(CampaignFile.model_validate(file), base)
 
 
 def load_campaign(name_or_path: str) -> Campaign:

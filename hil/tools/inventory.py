@@ -1,0 +1,153 @@
+"""What there is to choose from: every registered thing and every file that ships, with its settings."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from typing import Any
+
+from hil.config.fields import Setting, settings
+from hil.config.load import builtin_names
+from hil.core.errors import BadInput
+from hil.core.figures import BY_NAME
+from hil.core.registries import BY_PLURAL, ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES
+from hil.core.registry import BUILT_IN, Entry, Registry
+from hil.runs.execute import INNER_LAWS
+
+# Where a scenario has the settings of a thing of a kind.
+_SET_BY = {
+    OUTER_LAWS.kind: "control.gains.tuned.{}.",
+    ESTIMATORS.kind: "control.estimator_settings.",
+    LOCALISERS.kind: "camera.localiser_settings.",
+    REFERENCES.kind: "reference.",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """One thing: `settings` are its own values, `search` the box that a tuning may vary."""
+
+    name: str
+    summary: str
+    origin: str = BUILT_IN
+    settings: tuple[Setting, ...] = ()
+    search: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    trace: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    unit: str = ""
+    set_by: str = ""
+
+    def lines(self) -> Iterator[str]:
+        """Yield a line for each setting, and for each term of its trace."""
+        if self.settings:
+            yield f"--set {self.set_by}KEY=VALUE, with KEY"
+        for item in self.settings:
+            unit = f" {item.unit}" if item.unit else ""
+            bounds = f", {item.bounds()}" if item.bounds() else ""
+            box = self.search.get(item.key)
+            searched = f", searched {box[0]:g} to {box[2]:g}" if box else ""
+            default = "must be given" if item.default is None else _short(item.default)
+            yield f"  {item.key} ({default}{bounds}{searched}{unit}): {item.meaning}"
+        for name, (unit, meaning) in self.trace.items():
+            yield f"records {name}{f' ({unit})' if unit else ''}: {meaning}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the item for a JSON document."""
+        return {
+            "name": self.name,
+            "summary": self.summary,
+            "origin": self.origin,
+            "unit": self.unit,
+            "set_by": self.set_by,
+            "settings": [
+                {
+                    "key": item.key,
+                    "unit": item.unit,
+                    "meaning": item.meaning,
+                    "default": _plain(item.default),
+                    "low": item.low,
+                    "high": item.high,
+                    "low_excluded": item.above,
+                    "high_excluded": item.below,
+                }
+                for item in self.settings
+            ],
+            "search": {name: list(box) for name, box in self.search.items()},
+            "trace": [
+                {"name": name, "unit": unit, "meaning": meaning}
+                for name, (unit, meaning) in self.trace.items()
+            ],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """All of one kind; `failed` is what could not be loaded: package -> its own error in one line."""
+
+    kind: str
+    items: tuple[Item, ...]
+    failed: Mapping[str, str] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the listing for a JSON document."""
+        return {"items": [item.to_json() for item in self.items], "failed": dict(self.failed)}
+
+
+def listing(kind: str, from_files: Sequence[str] = ()) -> Listing:
+    """Return all there is of a kind, as `hil list` names them; raises BadInput for a bad file."""
+    if kind in BY_PLURAL:
+        return _registered(kind, BY_PLURAL[kind], from_files)
+    if from_files:
+        raise BadInput(f"{from_files[0]}: {kind} do not come from Python files")
+    if kind == "wheel-laws":
+        said = {"asg-ism": "averaged sub-gradient integral sliding mode", "pid": "PID"}
+        items = [Item(name, f"{said.get(name, name)}, on the board") for name in INNER_LAWS]
+    elif kind == "figures":
+        items = [Item(m.name, m.definition, unit=m.unit) for m in BY_NAME.values()]
+    else:
+        items = [Item(name, _first_words(kind, name)) for name in builtin_names(kind)]
+    return Listing(kind, tuple(items))
+
+
+def _registered(kind: str, registry: Registry, from_files: Sequence[str]) -> Listing:
+    for file in from_files:
+        registry.get(file)
+    entries = registry.entries()
+    failed = dict(registry.failed)
+    items = []
+    for entry in entries:
+        try:
+            items.append(_item(entry, registry))
+        except BadInput as error:  # a package's trace= that is none
+            failed[entry.origin] = str(error)
+    return Listing(kind, tuple(items), failed)
+
+
+def _item(entry: Entry, registry: Registry) -> Item:
+    own = entry.settings
+    keys = tuple(settings(own)) if own is not None else ()
+    if registry is REFERENCES:
+        keys = tuple(key for key in keys if key.key != "kind")
+    set_by = _SET_BY[registry.kind].format(entry.key)
+    return Item(
+        entry.name, entry.summary, entry.origin, keys, entry.search, entry.trace, set_by=set_by
+    )
+
+
+def _first_words(kind: str, name: str) -> str:
+    """Return what a file says of itself: its description, or the first line of its comment."""
+    text = (files("hil") / "data" / kind / f"{name}.toml").read_text(encoding="utf-8")
+    said = tomllib.loads(text).get("description")
+    if said:
+        return str(said)
+    first = text.splitlines()[0]
+    return first.removeprefix("#").strip() if first.startswith("#") else ""
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _plain(value: Any) -> Any:
+    return value if value is None or isinstance(value, str | int | float | bool) else str(value)
