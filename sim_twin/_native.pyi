@@ -26,6 +26,8 @@ class PlantParams:
     """Parameters of the robot model; the names in PARAMETERS, all floats, all 0 at first."""
 
     slip: bool
+    castor: bool
+    castor_friction_ratio: float
     lifted: bool
     def __setattr__(self, name: str, value: float, /) -> None: ...
     def __getattr__(self, name: str, /) -> float: ...
@@ -210,6 +212,7 @@ class Robot:
     wheel_half_width: float
     half_track: float
     half_base: float
+    axle_x: float
     plate: _Colour
     side: _Colour
     tyre: _Colour

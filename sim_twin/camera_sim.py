@@ -74,6 +74,7 @@ def _robot(camera: CameraConfig) -> _native.Robot:
     robot.bottom, robot.top = look.body_bottom_m, marks.height_m
     robot.wheel_radius, robot.wheel_half_width = look.wheel_radius_m, 0.5 * look.wheel_width_m
     robot.half_track, robot.half_base = 0.5 * look.track_m, 0.5 * look.wheelbase_m
+    robot.axle_x = look.axle_x_m
     robot.plate, robot.side = look.plate_colour, look.side_colour
     robot.tyre, robot.hub = look.tyre_colour, look.hub_colour
     colours = [marks.front.colour, marks.rear.colour]

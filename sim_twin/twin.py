@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from random import Random
 from typing import TYPE_CHECKING, Protocol
 
+from hil.control.vehicles.vehicle import make_vehicle
 from hil.core.errors import RigFault
 from hil.core.rig import Frame, Truth
 from hil.core.types import Pose
@@ -97,6 +98,7 @@ class Twin:
             return Random(f"{setup.seed} {part}")
 
         self._setup = setup
+        self._vehicle = make_vehicle(setup.robot)
         self._maker = maker
         self._kernel = make_kernel(
             setup.robot, setup.link.baud, rng("kernel"), setup.disturbances, setup.faults, board
@@ -149,12 +151,7 @@ class Twin:
         """Return the true state now."""
         state = self._kernel.state()
         pose = Pose(*self._pose_at(self._now_s))
-        d0_m = self._setup.robot.d0_m
-        z1_m = (
-            pose.x_m + d0_m * math.cos(pose.theta_rad),
-            pose.y_m + d0_m * math.sin(pose.theta_rad),
-        )
-        return Truth(pose, state[3], state[5], z1_m)
+        return Truth(pose, state[3], state[5], self._vehicle.flat_output(pose))
 
     def close(self) -> None:
         """Nothing is held that needs releasing."""

@@ -160,11 +160,14 @@ class RobotLookConfig(Section):
     )
     wheelbase_m: float = quantity(
         "m",
-        "distance of front and rear wheels",
+        "distance of front and rear wheels; 0: one axle",
         0.15,
-        gt=0.0,
+        ge=0.0,
         le=1.0,
         source="thesis table 8.3, length a",
+    )
+    axle_x_m: float = quantity(
+        "m", "middle of the axles, or the one axle, in the body frame", 0.0, ge=-1.0, le=1.0
     )
     plate_colour: Colour = quantity("(ratio)", "matt black, as a marks' ground", (0.05, 0.05, 0.05))
     side_colour: Colour = quantity("(ratio)", "black in its own shade", (0.09, 0.09, 0.10))

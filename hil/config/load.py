@@ -25,6 +25,10 @@ from hil.core.registry import is_file_name
 # Values that would be laid aside: the command's own option (in a campaign, its list) decides them.
 _BY_OPTION = {"board.LAW": "--inner", "control.outer": "--outer"}
 
+# Tables of a scenario that a file of their own may hold.
+_PARTS = ("robot", "camera")
+_SKID_STEER = "skid-steer"
+
 Tree = dict[str, Any]
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -66,11 +70,37 @@ def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
         return scenario
     tree = scenario.model_dump(mode="json")
     for text in overrides:
-        set_value(tree, text)
+        tree = _with_file(tree, text)
+    for text in overrides:
+        if _part_of(text) is None:
+            set_value(tree, text)
     _fill_board(tree)
     changed = build(Scenario, tree, "--set")
     check_board(changed.board)
     return changed
+
+
+def _part_of(text: str) -> str | None:
+    """Return the part whose file KEY=VALUE names, None where it names a value."""
+    key = text.partition("=")[0].strip()
+    return next((part for part in _PARTS if key == f"{part}.file"), None)
+
+
+def _with_file(tree: Tree, text: str) -> Tree:
+    """Return the tree with a robot's or camera's file laid over it, where KEY=VALUE names one."""
+    part = _part_of(text)
+    if part is None:
+        return tree
+    value = parse_value(text.partition("=")[2])
+    return merge(tree, {part: _part_tree(str(value), part)})
+
+
+def _part_tree(name_or_path: str, part: str, above: tuple[str, ...] = ()) -> Tree:
+    """Return a robot's or camera's file; a robot that does not say its vehicle is a skid-steer."""
+    tree = read_tree(name_or_path, f"{part}s", above)
+    if part == "robot":
+        tree.setdefault("vehicle", {"kind": _SKID_STEER})
+    return tree
 
 
 def _fill_board(tree: Tree) -> None:
@@ -93,10 +123,10 @@ def read_tree(name_or_path: str, kind: str, above: tuple[str, ...] = ()) -> Tree
         tree = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # a number or brackets beyond what Python takes
         raise BadInput(f"{where}: not valid TOML: {error}") from None
-    for part in ("robot", "camera"):
+    for part in _PARTS:
         if isinstance(tree.get(part), Mapping) and "file" in tree[part]:
             own = dict(tree[part])
-            below = read_tree(_beside(folder, str(own.pop("file"))), f"{part}s", above)
+            below = _part_tree(_beside(folder, str(own.pop("file"))), part, above)
             tree[part] = merge(below, own)
     _set_files_beside(tree, folder)
     base = tree.pop("base", None)
@@ -109,11 +139,14 @@ def read_tree(name_or_path: str, kind: str, above: tuple[str, ...] = ()) -> Tree
 # Values that name a registered thing, or a file that defines one.
 _PLUGIN_KEYS = (
     ("control", "outer"), ("control", "estimator"), ("camera", "localiser"), ("reference", "kind"),
+    ("vehicle", "kind"),
 )  # fmt: skip
 
 
 def _set_files_beside(tree: Tree, folder: Path | None) -> None:
     """Make the path of a law's file and the like, named relative to the scenario's, whole; in place."""
+    if isinstance(tree.get("robot"), dict):
+        _set_files_beside(tree["robot"], folder)
     for table, key in _PLUGIN_KEYS:
         node = tree.get(table)
         if folder is not None and isinstance(node, dict) and is_file_name(str(node.get(key, ""))):
@@ -160,7 +193,8 @@ def _read_text(name_or_path: str, kind: str) -> tuple[str, str, Path | None]:
 def merge(below: Tree, above: Tree) -> Tree:
     """Return `below` with the keys of `above` laid over it; tables merge, lists replace.
 
-    A table that changes its `kind` replaces the one below: its other keys belong to that kind.
+    A table that changes its `kind` replaces the one below: its other keys belong to that kind. So
+    does a robot of another kind of vehicle.
     """
     result = dict(below)
     for key, value in above.items():
@@ -173,6 +207,10 @@ def merge(below: Tree, above: Tree) -> Tree:
 
 
 def _changes_kind(old: Tree, new: Tree) -> bool:
+    if isinstance(new.get("vehicle"), dict) and "mass_kg" in old:
+        below = old.get("vehicle", {})
+        before = below.get("kind", _SKID_STEER) if isinstance(below, dict) else _SKID_STEER
+        return bool(new["vehicle"].get("kind", before) != before)
     return "kind" in new and new["kind"] != old.get("kind")
 
 

@@ -12,6 +12,7 @@ OUTER_LAWS = Registry("outer law", "skid_steer_hil.outer_laws", "hil.control.law
 ESTIMATORS = Registry("estimator", "skid_steer_hil.estimators", "hil.control.estimators")
 REFERENCES = Registry("reference", "skid_steer_hil.references", "hil.control.references")
 LOCALISERS = Registry("localiser", "skid_steer_hil.localisers", "vision.localisers")
+VEHICLES = Registry("vehicle", "skid_steer_hil.vehicles", "hil.control.vehicles")
 
 # As `hil list` names them.
 BY_PLURAL = {
@@ -19,5 +20,6 @@ BY_PLURAL = {
     "estimators": ESTIMATORS,
     "references": REFERENCES,
     "localisers": LOCALISERS,
+    "vehicles": VEHICLES,
 }
 BY_KIND = {registry.kind: registry for registry in BY_PLURAL.values()}

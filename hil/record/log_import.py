@@ -32,8 +32,8 @@ from pydantic import Field, ValidationError
 
 from hil.config.base import Section
 from hil.config.load import load_scenario
-from hil.control.estimators.geometry import BelievedGeometry
 from hil.control.references import make_reference
+from hil.control.vehicles.vehicle import make_vehicle
 from hil.core.errors import BadInput
 from hil.record.manifest import Manifest, collect_versions, git_revision
 from hil.record.recorder import Recorder
@@ -280,16 +280,14 @@ def _completed(signals: Signals, scenario: Scenario) -> dict[str, Array]:
         "delta1_y_m": z1[1] - goal[:, 1],
     }
     columns = {name: np.full(t_s.size, math.nan) for name in SAMPLE_NAMES} | derived | given
-    geometry = BelievedGeometry(
-        robot.wheel_radius_m, robot.track_m, robot.d0_m, robot.encoder_counts_per_turn
-    )
+    vehicle = make_vehicle(robot)
     if "eta1_cmd_m_s" in given and "omega_cmd_left_rad_s" not in given:
         pairs = zip(columns["eta1_cmd_m_s"], columns["theta_dot_cmd_rad_s"], strict=True)
-        wheels = np.array([geometry.wheels(float(eta1), float(turn)) for eta1, turn in pairs])
+        wheels = np.array([vehicle.wheels(float(eta1), float(turn)) for eta1, turn in pairs])
         columns["omega_cmd_left_rad_s"], columns["omega_cmd_right_rad_s"] = wheels.T
     elif "omega_cmd_left_rad_s" in given and "eta1_cmd_m_s" not in given:
         pairs = zip(columns["omega_cmd_left_rad_s"], columns["omega_cmd_right_rad_s"], strict=True)
-        body = np.array([geometry.body(float(left), float(right)) for left, right in pairs])
+        body = np.array([vehicle.body(float(left), float(right)) for left, right in pairs])
         columns["eta1_cmd_m_s"], columns["theta_dot_cmd_rad_s"] = body.T
     return columns
 

@@ -134,7 +134,7 @@ def replay(
     if not samples["t_s"].size:
         _refuse_without_ticks(source)
     if shadow is not None:
-        samples = samples | shadow.columns(parts.geometry.wheels, samples["t_s"].size)
+        samples = samples | shadow.columns(parts.vehicle.wheels, samples["t_s"].size)
     stamps = [
         LoggedFrame(source.manifest.start_unix_us + round(t_s * 1e6), frame)
         for t_s, frame in recorder.link_frames

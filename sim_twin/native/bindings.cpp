@@ -57,6 +57,8 @@ void bind_plant(nb::module_& m) {
 #define X(name) .def_rw(#name, &PlantParams::name)
       TWIN_PLANT_PARAMETERS(X)
 #undef X
+      .def_rw("castor", &PlantParams::castor)
+      .def_rw("castor_friction_ratio", &PlantParams::castor_friction_ratio)
       .def_rw("slip", &PlantParams::slip)
       .def_rw("lifted", &PlantParams::lifted);
 
