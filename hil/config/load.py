@@ -154,8 +154,8 @@ def _set_files_beside(tree: Tree, folder: Path | None) -> None:
 
 
 def _base_kind(base: str, kind: str) -> str:
-    """Return the kind of the file below: a scenario lies on another one or on a lab."""
-    if kind != "scenarios":
+    """Return the kind of the file below: a scenario or lab lies on either."""
+    if kind not in {"scenarios", "labs"}:
         return kind
     return "scenarios" if base in builtin_names("scenarios") else "labs"
 

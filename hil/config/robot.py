@@ -190,7 +190,9 @@ class RobotConfig(Section):
             return self
         for name, axle_m in axles_m.items():
             if axle_m is None and isinstance(self.vehicle, SkidSteerConfig):
-                raise ValueError(f"{name} is missing; a skid-steer robot has two axles: give it, in m")
+                raise ValueError(
+                    f"{name} is missing; a skid-steer robot has two axles: give it, in m"
+                )
         wheelbase_m = sum(axle_m or 0.0 for axle_m in axles_m.values())
         if self.d0_m >= wheelbase_m > 0.0:
             raise ValueError(f"d0_m must be below the wheelbase of {wheelbase_m:.3f} m (2.31)")
