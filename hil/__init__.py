@@ -26,6 +26,7 @@ _NAMES = {
     "Scenario": ("hil.config.scenario", "Scenario"),
     "OuterLimits": ("hil.config.control", "OuterLimits"),
     "ReferenceConfig": ("hil.config.control", "ReferenceConfig"),
+    "serve_plant": ("sim_twin.plant_server", "serve"),
 }
 # decorator -> registry of hil.core.registries
 _DECORATORS = {
@@ -55,6 +56,7 @@ __all__ = [
     "localiser",
     "outer_law",
     "reference",
+    "serve_plant",
 ]
 
 if TYPE_CHECKING:
@@ -73,6 +75,7 @@ if TYPE_CHECKING:
     from hil.core.types import PoseMeasurement as PoseMeasurement
     from hil.core.types import ReferenceState as ReferenceState
     from hil.core.types import WheelSample as WheelSample
+    from sim_twin.plant_server import serve as serve_plant
 
     outer_law = OUTER_LAWS.register
     estimator = ESTIMATORS.register

@@ -13,13 +13,15 @@ from dataclasses import dataclass
 from random import Random
 from typing import TYPE_CHECKING, Protocol
 
+from hil.config.robot import BUILT_IN_PLANT
 from hil.control.vehicles.vehicle import make_vehicle
-from hil.core.errors import RigFault
+from hil.core.errors import BadInput, RigFault
 from hil.core.rig import Frame, Truth
 from hil.core.types import Pose
 from sim_twin.camera_timing import Exposure, Shutter, Span
 from sim_twin.drawn_poses import DrawnPoses, PoseTuple, load_localiser_error
 from sim_twin.link_model import Channel, Serialiser
+from sim_twin.outside_plant import PERIOD_US, OutsidePlant
 from sim_twin.setup import make_kernel
 
 if TYPE_CHECKING:
@@ -115,6 +117,23 @@ class Twin:
         self._exposed: deque[tuple[Exposure, tuple[PoseTuple, ...]]] = deque()
         self._set_spans(math.inf)
         self._next_frame = self._shutter.next(self._stalls)
+        self._outside = self._open_outside(setup)
+        self._outside_told = False
+
+    def _open_outside(self, setup: TwinSetup) -> OutsidePlant | None:
+        """Have the robot's motion worked out by another program where the robot's file says so."""
+        if setup.robot.plant == BUILT_IN_PLANT:
+            return None
+        outside = OutsidePlant(setup.robot.plant, setup.robot, setup.start, setup.seed)
+        loads = [item.target for item in setup.disturbances if item.target != "battery_sag_v"]
+        stuck = [fault.kind for fault in setup.faults if fault.kind == "motor_stuck"]
+        try:
+            outside.check_takes([*loads, *stuck])
+        except BadInput:
+            outside.close()
+            raise
+        self._kernel.set_outside(outside.step, PERIOD_US)
+        return outside
 
     def now_s(self) -> float:
         """Return the virtual host clock."""
@@ -154,7 +173,9 @@ class Twin:
         return Truth(pose, state[3], state[5], self._vehicle.flat_output(pose))
 
     def close(self) -> None:
-        """Nothing is held that needs releasing."""
+        """End the program that works out the robot's motion, where there is one."""
+        if self._outside is not None:
+            self._outside.close()
 
     def deliver_to_board(self, t_s: float, data: bytes) -> None:
         """Let bytes reach the board's UART at `t_s`; in time order."""
@@ -175,6 +196,9 @@ class Twin:
             reached_us = self._kernel.advance(target_us)
         except RuntimeError as error:
             raise RigFault(f"twin: {error}; check the robot's parameters") from None
+        if self._outside is not None and self._outside.fault and not self._outside_told:
+            self._outside_told = True  # once: the board must be told to stop after it
+            raise RigFault(self._outside.fault)
         for t_us, data in self._kernel.take_sent():
             carried = self._up.carry(HOST_START_S + 1e-6 * t_us, data)
             if carried is not None:

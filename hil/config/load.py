@@ -69,10 +69,13 @@ def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
     if not overrides:
         return scenario
     tree = scenario.model_dump(mode="json")
-    for text in overrides:
+    files_named = [text for text in overrides if _part_of(text) is not None]
+    for text in files_named:
         tree = _with_file(tree, text)
+    if files_named:  # with every value that a file leaves at its default
+        tree = build(Scenario, tree, "--set").model_dump(mode="json")
     for text in overrides:
-        if _part_of(text) is None:
+        if text not in files_named:
             set_value(tree, text)
     _fill_board(tree)
     changed = build(Scenario, tree, "--set")
@@ -151,6 +154,8 @@ def _set_files_beside(tree: Tree, folder: Path | None) -> None:
         node = tree.get(table)
         if folder is not None and isinstance(node, dict) and is_file_name(str(node.get(key, ""))):
             node[key] = str(folder.resolve() / node[key])
+    if folder is not None and is_file_name(str(tree.get("plant", ""))):  # of a robot
+        tree["plant"] = str(folder.resolve() / tree["plant"])
 
 
 def _base_kind(base: str, kind: str) -> str:

@@ -7,9 +7,10 @@ Bounds stand here; the numbers and where each one comes from stand in the robot 
 from __future__ import annotations
 
 import math
+import re
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, Field, SerializeAsAny, model_validator
+from pydantic import AfterValidator, BaseModel, Field, SerializeAsAny, model_validator
 
 from hil.config.base import OpenSection, PlainName, Section, quantity
 from hil.config.limits import board_table
@@ -96,6 +97,26 @@ class BringUpConfig(Section):
     battery_v: float = quantity("V", "battery at full speed", gt=0, le=60)
 
 
+BUILT_IN_PLANT = "builtin"
+_PORT = re.compile(r"tcp:(127\.0\.0\.1|localhost):(\d{1,5})")
+
+
+def _plant(name: str) -> str:
+    """Refuse a plant that is not built in, no file, and no port of this machine."""
+    if name.startswith("tcp:"):
+        port = _PORT.fullmatch(name)
+        if not port or not 1 <= int(port[2]) <= 65_535:
+            raise ValueError(
+                "a plant is reached on this machine only: tcp:127.0.0.1:PORT, 1 to 65535"
+            )
+    elif name != BUILT_IN_PLANT and not name.endswith(".py"):
+        raise ValueError(f"choose {BUILT_IN_PLANT}, tcp:127.0.0.1:PORT or a file, ./my_plant.py")
+    return name
+
+
+PlantName = Annotated[str, AfterValidator(_plant)]
+
+
 class VehicleConfig(OpenSection):
     """What kind of vehicle the robot is; each kind's own model lies on this one."""
 
@@ -135,6 +156,11 @@ class RobotConfig(Section):
     variant: Literal["constrained", "slip", "lifted"] = Field(
         description="constrained: eta2 = -d0 theta_dot (2.31) and rolling wheels; slip: neither; "
         "lifted: on blocks, the wheels turn freely"
+    )
+    plant: PlantName = Field(
+        BUILT_IN_PLANT,
+        description="simulated targets: what works out the robot's motion: builtin, a file, or "
+        "tcp:127.0.0.1:PORT",
     )
     mass_kg: float = quantity("kg", "m, whole robot", ge=0.5, le=50)
     inertia_kg_m2: float = quantity(

@@ -14,6 +14,7 @@ import cv2
 from hil.analysis.metrics import LinkStats
 from hil.config.fit import check_fit
 from hil.config.limits import wheel_speed_max_rad_s
+from hil.config.robot import BUILT_IN_PLANT
 from hil.control.estimators.making import make_estimator
 from hil.control.laws.hold import HoldAtGoal
 from hil.control.laws.making import make_outer_law
@@ -23,7 +24,7 @@ from hil.control.task_notes import notes
 from hil.control.vehicles.vehicle import make_vehicle
 from hil.core.clocks import CameraClock
 from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES, VEHICLES
-from hil.core.registry import BUILT_IN
+from hil.core.registry import BUILT_IN, Entry, SourceText
 from hil.record.manifest import Manifest, Plugin, collect_versions, git_revision
 from hil.record.memory import MemoryRecorder
 from hil.record.recorder import Recorder
@@ -186,7 +187,19 @@ def plugins_of(spec: RunSpec) -> list[Plugin]:
         (VEHICLES, spec.scenario.robot.vehicle.kind),
     )
     entries = [(registry.kind, registry.get(name)) for registry, name in used]
-    return [Plugin.of(kind, entry) for kind, entry in entries if entry.origin != BUILT_IN]
+    found = [Plugin.of(kind, entry) for kind, entry in entries if entry.origin != BUILT_IN]
+    return found + _plant_of(spec)
+
+
+def _plant_of(spec: RunSpec) -> list[Plugin]:
+    """Return what worked out the robot's motion where the harness did not, for the record."""
+    where = spec.scenario.robot.plant
+    if spec.target not in SIMULATED or where == BUILT_IN_PLANT:
+        return []
+    path = Path(where)
+    text = None if where.startswith("tcp:") or not path.is_file() else path.read_text("utf-8")
+    source = None if text is None else SourceText(path, text)
+    return [Plugin.of("plant", Entry(where, type(None), "", origin=where, source=source))]
 
 
 def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None = None) -> Parts:

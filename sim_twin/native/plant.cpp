@@ -75,6 +75,11 @@ double Plant::battery_v(const Drive& drive, double sag_v) const {
   return battery_v(x_[kCharge], draw_a(Pair{x_[kCurrentL], x_[kCurrentR]}, drive), sag_v);
 }
 
+double Plant::charge_after(double h_s, const Drive& drive) const {
+  const Pair current_a = {x_[kCurrentL], x_[kCurrentR]};
+  return x_[kCharge] - h_s * d_.per_charge * draw_a(current_a, drive);
+}
+
 // The bridge draws duty * current from the battery (power in = power out, drop taken at the motor).
 double Plant::draw_a(Pair current_a, const Drive& drive) const {
   return p_.battery_idle_a + p_.motor_per_side * sum(drive.duty * current_a);

@@ -106,6 +106,7 @@ class Plant {
   const StateVector& state() const { return x_; }
   StateVector& state() { return x_; }
   double battery_v(const Drive& drive, double sag_v) const;  // at the terminals, now
+  double charge_after(double h_s, const Drive& drive) const; // at the current drawn now
   StateVector derivative(const StateVector& x, const Drive& drive, const LoadVector& load) const;
 
  private:
