@@ -49,13 +49,16 @@ class MujocoPlant:
     takes = ("force_forward_n", "force_left_n", "torque_yaw_n_m")
 
     def reset(
-        self, robot: Mapping[str, Any], start: Mapping[str, float], dt_s: float, seed: int
+        self,
+        robot: Mapping[str, Any],
+        start: Mapping[str, float],
+        dt_s: float,  # noqa: ARG002 - a step is told its own
+        seed: int,  # noqa: ARG002 - nothing is drawn
     ) -> None:
         """Build the robot from its file, standing at `start`."""
         if robot["vehicle"]["kind"] != "differential":
             raise SystemExit("this plant knows differential robots only; try robot.file=diff-2wd")
         self.robot, self.motor, self.bridge = robot, robot["motor"], robot["bridge"]
-        self.substeps = round(dt_s / STEP_S)
         r = robot["wheel_radius_m"]
         wheel_kg = 0.01  # the rest of a wheel's mass is the robot's
         rotor = self.motor["gear_ratio"] ** 2 * self.motor["rotor_inertia_kg_m2"]
@@ -99,7 +102,7 @@ class MujocoPlant:
         joints = [data.joint("left"), data.joint("right")]
         body = data.body("robot")
         currents = [0.0, 0.0]
-        for _ in range(self.substeps):
+        for _ in range(round(dt_s / STEP_S)):
             for side, joint in enumerate(joints):
                 torque, currents[side] = self._torque(volts[side], float(joint.qvel[0]))
                 joint.qfrc_applied[0] = torque

@@ -268,7 +268,7 @@ def test_a_load_that_the_plant_does_not_know_is_refused(tmp_path, plant_file):
     assert "it takes: load_left_n_m" in done.refusal
 
 
-def test_a_wrapped_heading_is_carried_on(monkeypatch):
+def test_a_wrapped_heading_is_carried_on():
     """A plant whose theta jumps from pi to -pi turns on in the record."""
 
     class Turning(Listener):
@@ -302,8 +302,8 @@ def test_mujoco_drives_the_three_experiments(tmp_path, scenario, outer):
 
 def test_served_over_its_own_input_a_plant_may_print(plant_file):
     """What a plant prints goes to stderr and does not disturb the wire."""
-    path = plant_file(EXAMPLE.replace("    def step(self, volts, dt_s, loads):",
-                                      "    def step(self, volts, dt_s, loads):\n        print(volts)"))  # fmt: skip
+    begin = "    def step(self, volts, dt_s, loads):"
+    path = plant_file(EXAMPLE.replace(begin, f"{begin}\n        print(volts)"))
     plant = OutsidePlant(str(path), robot(), Pose(0.0, 0.0, 0.0), 1)
     state = plant.step(0, (6.0, 6.0), NO_LOADS, (0.0, 0.0))
     plant.close()
