@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 # Pairs of one robot agree within these; a find elsewhere is another thing.
 SAME_PLACE_M = 0.02
 SAME_HEADING_RAD = 0.15
+# A prediction is not further off than this.
+TURNED_RAD = 0.6
 
 Point = tuple[float, float]
 Image = NDArray[np.uint8]
@@ -53,12 +55,13 @@ class ManyMarks:
     ) -> PoseMeasurement:
         """Return the pose seen in an image, (H, W, 3) uint8 BGR, as a pair's localiser does.
 
-        Pairs are looked for about `predicted`, else about the first one found in the whole image.
+        Pairs are looked for about `predicted`, and in the whole image when none is there.
         """
         around = None if predicted is None else self._around(image_bgr, predicted, search_radius_m)
         found: list[Find] = []
+        reason = ""
         if predicted is not None and around is not None:
-            found, _ = self._pairs_in(around, predicted, search_radius_m)
+            found = self._pairs_near(around, predicted, search_radius_m)
         if not found:
             found, reason = self._anywhere(image_bgr, search_radius_m)
         if not found:
@@ -66,28 +69,31 @@ class ManyMarks:
         return self._fitted(found)
 
     def _anywhere(self, image_bgr: Image, search_radius_m: float) -> tuple[list[Find], str]:
-        """Return the pairs of the whole image: the first one found says where the others are."""
-        reason = ""
-        for _, localiser in self._pairs:
-            seen = localiser.locate(image_bgr, None, search_radius_m)
-            if seen.pose is not None:
-                around = self._around(image_bgr, seen.pose, search_radius_m)
-                within = image_bgr if around is None else around
-                return self._pairs_in(within, seen.pose, search_radius_m)
-            reason = reason or seen.reason
-        return [], reason
+        """Return every pair that is found in the whole image, and why the first is not."""
+        seen = [
+            (pair, localiser.locate(image_bgr, None, search_radius_m))
+            for pair, localiser in self._pairs
+        ]
+        reason = next((one.reason for _, one in seen if one.pose is None), "")
+        return [(pair, one) for pair, one in seen if one.pose is not None], reason
 
-    def _pairs_in(
-        self, image_bgr: Image, predicted: Pose, search_radius_m: float
-    ) -> tuple[list[Find], str]:
+    def _pairs_near(self, image_bgr: Image, predicted: Pose, search_radius_m: float) -> list[Find]:
+        """Return the pairs found; one with a mark that is known to be covered is not looked for."""
         found: list[Find] = []
-        reason = ""
+        failed: list[tuple[int, int]] = []
+        covered: set[int] = set()
+        reach_m = search_radius_m + SAME_PLACE_M
         for pair, localiser in self._pairs:
+            if covered.intersection(pair):
+                continue
             seen = localiser.locate(image_bgr, predicted, search_radius_m)
-            if seen.pose is not None:
+            if seen.pose is not None and _near(seen.pose, predicted, reach_m, TURNED_RAD):
                 found.append((pair, seen))
-            reason = reason or seen.reason
-        return found, reason
+            else:
+                failed.append(pair)
+            shown = {mark for known, _ in found for mark in known}
+            covered = {mark for lost in failed if shown & {*lost} for mark in {*lost} - shown}
+        return found
 
     def _around(self, image_bgr: Image, pose: Pose, search_radius_m: float) -> Image | None:
         """Return the image, black but for where the robot's marks may be; None when out of view.
@@ -148,8 +154,11 @@ def _two(one: MarkConfig, other: MarkConfig) -> dict[str, object]:
 
 
 def _same(one: PoseMeasurement, other: PoseMeasurement) -> bool:
-    a, b = one.pose, other.pose
-    assert a is not None
-    assert b is not None
-    near = math.hypot(a.x_m - b.x_m, a.y_m - b.y_m) < SAME_PLACE_M
-    return near and abs(wrap_pi(a.theta_rad - b.theta_rad)) < SAME_HEADING_RAD
+    assert one.pose is not None
+    assert other.pose is not None
+    return _near(one.pose, other.pose, SAME_PLACE_M, SAME_HEADING_RAD)
+
+
+def _near(a: Pose, b: Pose, within_m: float, within_rad: float) -> bool:
+    apart_m = math.hypot(a.x_m - b.x_m, a.y_m - b.y_m)
+    return apart_m < within_m and abs(wrap_pi(a.theta_rad - b.theta_rad)) < within_rad
