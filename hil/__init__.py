@@ -26,6 +26,9 @@ _NAMES = {
     "Scenario": ("hil.config.scenario", "Scenario"),
     "OuterLimits": ("hil.config.control", "OuterLimits"),
     "ReferenceConfig": ("hil.config.control", "ReferenceConfig"),
+    "Contacts": ("hil.control.vehicles.vehicle", "Contacts"),
+    "TwoSided": ("hil.control.vehicles.vehicle", "TwoSided"),
+    "VehicleConfig": ("hil.config.robot", "VehicleConfig"),
     "serve_plant": ("sim_twin.plant_server", "serve"),
 }
 # decorator -> registry of hil.core.registries
@@ -34,10 +37,12 @@ _DECORATORS = {
     "estimator": "ESTIMATORS",
     "localiser": "LOCALISERS",
     "reference": "REFERENCES",
+    "vehicle": "VEHICLES",
 }
 
 __all__ = [
     "BadInput",
+    "Contacts",
     "Estimate",
     "Estimator",
     "OuterCommand",
@@ -50,6 +55,8 @@ __all__ = [
     "RigFault",
     "Scenario",
     "Section",
+    "TwoSided",
+    "VehicleConfig",
     "WheelSample",
     "__version__",
     "estimator",
@@ -57,16 +64,20 @@ __all__ = [
     "outer_law",
     "reference",
     "serve_plant",
+    "vehicle",
 ]
 
 if TYPE_CHECKING:
     from hil.config.base import Section as Section
     from hil.config.control import OuterLimits as OuterLimits
     from hil.config.control import ReferenceConfig as ReferenceConfig
+    from hil.config.robot import VehicleConfig as VehicleConfig
     from hil.config.scenario import Scenario as Scenario
+    from hil.control.vehicles.vehicle import Contacts as Contacts
+    from hil.control.vehicles.vehicle import TwoSided as TwoSided
     from hil.core.errors import BadInput as BadInput
     from hil.core.errors import RigFault as RigFault
-    from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES
+    from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES, VEHICLES
     from hil.core.types import Estimate as Estimate
     from hil.core.types import Estimator as Estimator
     from hil.core.types import OuterCommand as OuterCommand
@@ -81,6 +92,7 @@ if TYPE_CHECKING:
     estimator = ESTIMATORS.register
     localiser = LOCALISERS.register
     reference = REFERENCES.register
+    vehicle = VEHICLES.register
 
 
 def __getattr__(name: str) -> Any:

@@ -7,10 +7,12 @@ import shlex
 from pathlib import Path
 
 from hil.config.load import load_robot, load_scenario
+from hil.control.vehicles.vehicle import make_vehicle
+from hil.record.reader import read_run
 from tests.cli.command import hil
 
 PAGE = (Path(__file__).parents[2] / "docs" / "own-robot.md").read_text("utf-8")
-FILES = dict(re.findall(r"```toml (\S+)\n(.*?)```", PAGE, re.DOTALL))
+FILES = dict(re.findall(r"```(?:toml|python) (\S+)\n(.*?)```", PAGE, re.DOTALL))
 COMMANDS = [
     line
     for block in re.findall(r"```console\n(.*?)```", PAGE, re.DOTALL)
@@ -23,13 +25,22 @@ def test_every_command_of_the_page_ends_well(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name, text in FILES.items():
         Path(name).write_text(text, encoding="utf-8")
-    assert len(FILES) == 3
-    assert len(COMMANDS) == 3
+    assert len(FILES) == 5
+    assert len(COMMANDS) == 4
     for line in COMMANDS:
         program, *words = shlex.split(line)
         assert program == "hil"
         done = hil(*words)
         assert done.status == 0, (line, done.out, done.err)
+    tracked = load_robot("tracked.toml")
+    assert make_vehicle(tracked).geometry.track_width_m == 1.2 * tracked.track_m
+    (plugin,) = [
+        plugin
+        for run in Path("runs").iterdir()
+        for plugin in read_run(run).manifest.plugins
+        if plugin.kind == "vehicle"
+    ]
+    assert plugin.name == "tracked"
     scenario = load_scenario("my-scenario.toml")
     assert scenario.robot == load_robot("my-robot.toml")
     assert (scenario.robot.vehicle.kind, scenario.robot.motor.gear_ratio) == ("differential", 34.0)
