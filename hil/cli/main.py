@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import signal
 import sys
 from typing import NoReturn
 
@@ -12,6 +13,8 @@ import click
 from hil import __version__
 from hil.core.errors import HilError
 from hil.core.text import visible
+from hil.runs.interruption import end_as_by_ctrl_c
+from hil.study.work_folder import Terminated
 
 # name -> (module, one-line help). The text stands here so that `hil --help` imports no command.
 COMMANDS = {
@@ -25,6 +28,10 @@ COMMANDS = {
     "import": ("hil.cli.importing", "Make a record of a MAVLink .tlog or a CSV file."),
     "view": ("hil.cli.view", "Open recorded runs in the viewer."),
     "sweep": ("hil.cli.sweep", "Run a campaign over grids, lists and distributions; draw maps."),
+    "reproduce": (
+        "hil.cli.reproduce",
+        "Reproduce the thesis's numerical studies, chapters 4 to 8; judge its claims.",
+    ),
     "tune": ("hil.cli.tune", "Tune the gains of both laws by one procedure and budget."),
     "twin": ("hil.cli.twin", "Serve the digital twin to other programs."),
     "firmware": ("hil.cli.firmware", "Generate, build, upload and configure the firmware."),
@@ -67,12 +74,13 @@ def cli() -> None:
 
     \b
     Exit status: 0 all requirements held, 1 a requirement failed, 2 bad usage or input,
-    3 rig fault (port, camera, board), 130 stopped by Ctrl-C.
+    3 rig fault (port, camera, board), 130 stopped by Ctrl-C (or SIGTERM, SIGHUP).
     """  # noqa: D301 - \b is click's mark for a verbatim paragraph
 
 
 def main() -> NoReturn:
     """Run the command line; every expected error is one line on stderr and its exit status."""
+    end_as_by_ctrl_c()
     try:
         status = cli.main(prog_name="hil", standalone_mode=False)
         sys.exit(status if isinstance(status, int) else 0)
@@ -85,7 +93,10 @@ def main() -> NoReturn:
     except HilError as error:
         click.echo(f"hil: {visible(str(error))}", err=True)
         sys.exit(error.exit_status)
-    except (click.Abort, KeyboardInterrupt):
+    except (click.Abort, KeyboardInterrupt) as error:
+        if isinstance(error.__cause__ or error, Terminated):
+            click.echo("hil: stopped by SIGTERM", err=True)
+            sys.exit(128 + signal.SIGTERM)
         click.echo("hil: stopped by Ctrl-C", err=True)
         sys.exit(130)
     except BrokenPipeError:

@@ -187,8 +187,10 @@ def _read_text(name_or_path: str, kind: str) -> tuple[str, str, Path | None]:
     if not path.is_file():
         names = builtin_names(kind)
         near = difflib.get_close_matches(name_or_path, names, n=2)
-        hint = f"did you mean {' or '.join(near)}?" if near else f"built in: {', '.join(names)}"
-        raise BadInput(f"{one} {name_or_path!r}: no such file and no built-in {one}; {hint}")
+        known = f"; built in: {', '.join(names)}" if names else ""
+        hint = f"; did you mean {' or '.join(near)}?" if near else known
+        none = f" and no built-in {one}" if names else f"; give the path of a {one} file"
+        raise BadInput(f"{one} {name_or_path!r}: no such file{none}{hint}")
     try:
         return path.read_text(encoding="utf-8"), str(path), path.parent
     except (OSError, UnicodeDecodeError) as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from hil.core.errors import BadInput
 from hil.record import layout
 from hil.record.journal import Columns, read_journal, read_parquet
 from hil.record.manifest import Manifest, file_entry, read_manifest
-from hil.record.schema import FRAME_NAMES, SAMPLE_NAMES
+from hil.record.schema import ADDED_LATER, FRAME_NAMES, SAMPLE_NAMES
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,10 +107,16 @@ def read_run(path: Path) -> RunRecord:
         problems.append("cut off in mid-run: the record was never closed")
     problems += altered_files(path, manifest)
     samples = read_table(path, layout.SAMPLES, layout.SAMPLES_JOURNAL, required=True)
+    rows = samples["t_s"].size if "t_s" in samples else 0
+    samples = {name: np.full(rows, math.nan) for name in ADDED_LATER} | samples
     missing = [name for name in SAMPLE_NAMES if name not in samples]
     if missing:
         raise BadInput(f"{path / layout.SAMPLES}: damaged: column {missing[0]} is missing")
-    frames = read_table(path, layout.FRAMES, layout.FRAMES_JOURNAL, required=False)
+    frames: Columns = {}
+    try:
+        frames = read_table(path, layout.FRAMES, layout.FRAMES_JOURNAL, required=False)
+    except BadInput as error:  # the samples are whole: what was seen is lost, the run is not
+        problems.append(str(error))
     return RunRecord(
         path=path,
         manifest=manifest,
@@ -164,14 +171,14 @@ def read_events(path: Path) -> tuple[Event, ...]:
 
 
 def picture_name(t_s: float) -> str:
-    """Return the file name of the picture that arrived at `t_s`."""
-    return f"{t_s:08.3f}s.jpg"
+    """Return the file name of the picture that arrived at `t_s`; no name begins with a dash."""
+    return f"t{t_s:08.3f}s.jpg"
 
 
 def read_pictures(folder: Path) -> tuple[Picture, ...]:
-    """Return the pictures of a record in time order."""
+    """Return the pictures of a record in time order; older records name them without the t."""
     pictures = []
     for file in folder.glob("*s.jpg"):
         with contextlib.suppress(ValueError):  # somebody else's file
-            pictures.append(Picture(float(file.stem.removesuffix("s")), file))
+            pictures.append(Picture(float(file.stem.removeprefix("t").removesuffix("s")), file))
     return tuple(sorted(pictures, key=lambda picture: picture.t_s))

@@ -20,7 +20,7 @@ from hil.core.registries import OUTER_LAWS
 from hil.core.types import Estimate, OuterCommand, OuterLaw, ReferenceState
 from hil.record import layout
 from hil.record.memory import MemoryRecorder
-from hil.record.schema import FRAME_NAMES, SAMPLE_NAMES
+from hil.record.schema import ADDED_LATER, FRAME_NAMES, SAMPLE_NAMES
 from hil.record.source import Source, load_plugins, read_source, recorded_scenario
 from hil.record.tlog import LoggedFrame
 from hil.replays.divergence import Channel, compare_columns, compare_link
@@ -135,10 +135,7 @@ def replay(
         _refuse_without_ticks(source)
     if shadow is not None:
         samples = samples | shadow.columns(parts.vehicle.wheels, samples["t_s"].size)
-    stamps = [
-        LoggedFrame(source.manifest.start_unix_us + round(t_s * 1e6), frame)
-        for t_s, frame in recorder.link_frames
-    ]
+    stamps = _stamps(source, samples, recorder.link_frames)
     return ReplayReport(
         path=path,
         kind=kind,
@@ -165,6 +162,28 @@ def _refuse_without_ticks(source: Source) -> None:
         )
 
 
+def _stamps(
+    source: Source, samples: Columns, frames: Sequence[tuple[float, bytes]]
+) -> list[LoggedFrame]:
+    """Return the replay's frames on the link, dated as those of the record.
+
+    A replay that ends before the first tick (the camera's frames are lost) still counts from its
+    opening, the record from its first tick, in whole microseconds: there the first frame on the link
+    is the common instant, and one microsecond is rounding.
+    """
+    zero_us = source.manifest.start_unix_us
+    before_first_tick = not samples["t_s"].size and frames and source.link
+    if before_first_tick:
+        zero_us = source.link[0].unix_us - round(frames[0][0] * 1e6)
+    found = [LoggedFrame(zero_us + round(t_s * 1e6), frame) for t_s, frame in frames]
+    if not before_first_tick:
+        return found
+    return [
+        there._replace(frame=here.frame) if abs(here.unix_us - there.unix_us) <= 1 else here
+        for here, there in zip(found, source.link, strict=False)
+    ]
+
+
 def _changed(recorded: Scenario, overrides: Sequence[str]) -> Scenario:
     """Return the scenario of a shadow; what the record alone decides cannot be changed."""
     changed = with_overrides(recorded, overrides)
@@ -182,7 +201,8 @@ def _channels(
     """Compare all that was computed again with what the record has of it."""
     found: list[Channel] = []
     if source.samples:
-        names = [name for name in SAMPLE_NAMES if name not in _GIVEN]
+        there = [name for name in SAMPLE_NAMES if name in source.samples or name not in ADDED_LATER]
+        names = [name for name in there if name not in _GIVEN]
         found += compare_columns(source.samples, samples, names, source.samples["t_s"])
     if source.frames:
         dated = source.frames["t_arrival_s"]

@@ -13,7 +13,7 @@ import cv2
 
 from hil.analysis.metrics import LinkStats
 from hil.config.fit import check_fit
-from hil.config.limits import wheel_speed_max_rad_s
+from hil.config.limits import check_edges, wheel_speed_max_rad_s
 from hil.config.robot import BUILT_IN_PLANT
 from hil.control.estimators.making import make_estimator
 from hil.control.laws.hold import HoldAtGoal
@@ -60,6 +60,7 @@ class RunSpec:
     seed: int
     out: Path
     record_camera: bool = False
+    small_video: bool = False
     rerun: bool = True
     command: str = ""
 
@@ -121,6 +122,7 @@ def execute(
             make_manifest(spec),
             plugins=plugins_of(spec),
             record_camera=spec.record_camera,
+            small_video=spec.small_video,
             frame_rate_hz=spec.scenario.camera.rate_hz,
             rerun=spec.rerun,
         )
@@ -155,11 +157,13 @@ def execute_in_memory(spec: RunSpec, rig: Rig | None = None) -> RunRecord:
 
 
 def board_parameters(scenario: Scenario, inner: str) -> dict[str, float]:
-    """Return every board parameter as this run needs it."""
-    return scenario.board | {
+    """Return every board parameter as this run needs it; raises BadInput where the board cannot count."""
+    parameters = scenario.board | {
         "ENC_COUNTS": float(scenario.robot.encoder_counts_per_turn),
         "LAW": INNER_LAWS[inner],
     }
+    check_edges(parameters)
+    return parameters
 
 
 def make_law(spec: RunSpec) -> OuterLaw:

@@ -57,7 +57,7 @@ def here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Do an experiment's runs in this process, and without section 8.9: both cost seconds."""
     monkeypatch.setattr("hil.study.experiment.circle_study", lambda: None)
     monkeypatch.setattr(
-        "hil.study.experiment.run_all", lambda specs, _: [execute(s) for s in specs]
+        "hil.study.side_by_side.run_all", lambda specs, _: [execute(s) for s in specs]
     )
 
 

@@ -62,9 +62,7 @@ class TwoSided:
     """What vehicles with a left and a right side that roll without slip share (2.30)-(2.36)."""
 
     def __init__(self, robot: RobotConfig) -> None:
-        self.geometry = BelievedGeometry(
-            robot.wheel_radius_m, robot.track_m, robot.d0_m, robot.encoder_counts_per_turn
-        )
+        self.geometry = BelievedGeometry.of(robot)
 
     def body(self, left: float, right: float) -> tuple[float, float]:
         """Return (forward, turn) of a pair of wheel angles or speeds: m and rad, or per s."""
