@@ -47,6 +47,10 @@ _NAMES = {
     "open_record": ("hil.api", "open_record"),
     "replay": ("hil.api", "replay"),
     "run": ("hil.api", "run"),
+    "Contacts": ("hil.control.vehicles.vehicle", "Contacts"),
+    "TwoSided": ("hil.control.vehicles.vehicle", "TwoSided"),
+    "VehicleConfig": ("hil.config.robot", "VehicleConfig"),
+    "serve_plant": ("sim_twin.plant_server", "serve"),
 }
 # decorator -> registry of hil.core.registries
 _DECORATORS = {
@@ -54,6 +58,7 @@ _DECORATORS = {
     "estimator": "ESTIMATORS",
     "localiser": "LOCALISERS",
     "reference": "REFERENCES",
+    "vehicle": "VEHICLES",
 }
 
 __all__ = [
@@ -61,6 +66,7 @@ __all__ = [
     "BelievedGeometry",
     "CameraConfig",
     "Comparison",
+    "Contacts",
     "Estimate",
     "Estimator",
     "EstimatorConfig",
@@ -78,6 +84,8 @@ __all__ = [
     "Run",
     "Scenario",
     "Section",
+    "TwoSided",
+    "VehicleConfig",
     "WheelSample",
     "__version__",
     "camera_model",
@@ -97,6 +105,8 @@ __all__ = [
     "reference",
     "replay",
     "run",
+    "serve_plant",
+    "vehicle",
 ]
 
 if TYPE_CHECKING:
@@ -116,12 +126,15 @@ if TYPE_CHECKING:
     from hil.config.control import EstimatorConfig as EstimatorConfig
     from hil.config.control import OuterLimits as OuterLimits
     from hil.config.control import ReferenceConfig as ReferenceConfig
+    from hil.config.robot import VehicleConfig as VehicleConfig
     from hil.config.scenario import Scenario as Scenario
     from hil.control.estimators.geometry import BelievedGeometry as BelievedGeometry
     from hil.control.references import Reference as Reference
+    from hil.control.vehicles.vehicle import Contacts as Contacts
+    from hil.control.vehicles.vehicle import TwoSided as TwoSided
     from hil.core.errors import BadInput as BadInput
     from hil.core.errors import RigFault as RigFault
-    from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES
+    from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES, VEHICLES
     from hil.core.types import Estimate as Estimate
     from hil.core.types import Estimator as Estimator
     from hil.core.types import OuterCommand as OuterCommand
@@ -134,6 +147,7 @@ if TYPE_CHECKING:
     from hil.tools.conformance import check_law as check_law
     from hil.tools.conformance import check_localiser as check_localiser
     from hil.tools.conformance import check_robot as check_robot
+    from sim_twin.plant_server import serve as serve_plant
     from vision.camera_setup import camera_model as camera_model
     from vision.tracker import Localiser as Localiser
 
@@ -141,6 +155,7 @@ if TYPE_CHECKING:
     estimator = ESTIMATORS.register
     localiser = LOCALISERS.register
     reference = REFERENCES.register
+    vehicle = VEHICLES.register
 
 
 def __getattr__(name: str) -> Any:

@@ -3,7 +3,7 @@
 SI units. World X right, Y up; body x forward, y left; theta counter-clockwise. Left is 0, right 1.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ class PlantParams:
     """Parameters of the robot model; the names in PARAMETERS, all floats, all 0 at first."""
 
     slip: bool
+    castor: bool
+    castor_friction_ratio: float
     lifted: bool
     def __setattr__(self, name: str, value: float, /) -> None: ...
     def __getattr__(self, name: str, /) -> float: ...
@@ -109,6 +111,12 @@ class Kernel:
         """Add a disturbance; times count from `begin`."""
     def add_fault(self, kind: int, left: bool, right: bool, start_s: float, end_s: float) -> None:
         """Add a fault; times count from `begin`, and one with start 0 is there before it too."""
+    def set_outside(
+        self,
+        outside: Callable[[int, Sequence[float], Sequence[float], Sequence[float]], list[float]],
+        period_us: int,
+    ) -> None:
+        """Have the state once a period from outside: (t_us, volts, loads, jam) -> the state at its end."""
     def begin(self, t_us: int) -> None:
         """Let the times of disturbances and faults count from `t_us`."""
     def advance(self, t_us: int) -> int:
@@ -210,6 +218,7 @@ class Robot:
     wheel_half_width: float
     half_track: float
     half_base: float
+    axle_x: float
     plate: _Colour
     side: _Colour
     tyre: _Colour

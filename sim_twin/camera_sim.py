@@ -74,14 +74,15 @@ def _robot(camera: CameraConfig) -> _native.Robot:
     robot.bottom, robot.top = look.body_bottom_m, marks.height_m
     robot.wheel_radius, robot.wheel_half_width = look.wheel_radius_m, 0.5 * look.wheel_width_m
     robot.half_track, robot.half_base = 0.5 * look.track_m, 0.5 * look.wheelbase_m
+    robot.axle_x = look.axle_x_m
     robot.plate, robot.side = look.plate_colour, look.side_colour
     robot.tyre, robot.hub = look.tyre_colour, look.hub_colour
-    colours = [marks.front.colour, marks.rear.colour]
+    colours = [mark.colour for mark in marks.all]
     if marks.swapped_marks:
-        colours.reverse()
+        colours[:2] = reversed(colours[:2])
     tag = camera.tag
     patches = [] if tag else [_board(look)]
-    for mark, colour in zip((marks.front, marks.rear), colours, strict=True):
+    for mark, colour in zip(marks.all, colours, strict=True):
         disc = _native.Patch()
         disc.disc = disc.mark = True
         disc.x, disc.y, disc.half_x = mark.x_m, mark.y_m, 0.5 * marks.diameter_m

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from random import Random
 from typing import TYPE_CHECKING
 
+from hil.control.vehicles.vehicle import make_vehicle
 from sim_twin import _native
 
 if TYPE_CHECKING:
@@ -21,10 +22,17 @@ _GROUPS = ("motor", "bridge", "battery", "floor")
 def plant_params(robot: RobotConfig) -> _native.PlantParams:
     """Return the plant's parameters: `motor.resistance_ohm` is `motor_resistance_ohm` there."""
     params = _native.PlantParams()
+    contacts = make_vehicle(robot).contacts
+    axles = {"front_axle_m": contacts.front_m, "rear_axle_m": contacts.rear_m}
     for name in _native.PARAMETERS:
+        if name in axles:
+            setattr(params, name, axles[name])
+            continue
         group, _, rest = name.partition("_")
         owner = getattr(robot, group) if group in _GROUPS else robot
         setattr(params, name, float(getattr(owner, rest if group in _GROUPS else name)))
+    params.castor = contacts.castor_friction_ratio is not None
+    params.castor_friction_ratio = contacts.castor_friction_ratio or 0.0
     params.slip = robot.variant == "slip"
     params.lifted = robot.variant == "lifted"
     return params

@@ -13,12 +13,15 @@ from dataclasses import dataclass
 from random import Random
 from typing import TYPE_CHECKING, Protocol
 
-from hil.core.errors import RigFault
+from hil.config.robot import BUILT_IN_PLANT
+from hil.control.vehicles.vehicle import make_vehicle
+from hil.core.errors import BadInput, RigFault
 from hil.core.rig import PORT_BYTES, Frame, LineBacklog, Truth
 from hil.core.types import Pose
 from sim_twin.camera_timing import Exposure, Shutter, Span
 from sim_twin.drawn_poses import DrawnPoses, PoseTuple, load_localiser_error
 from sim_twin.link_model import BITS_PER_BYTE, Channel, Serialiser
+from sim_twin.outside_plant import PERIOD_US, OutsidePlant
 from sim_twin.setup import make_kernel
 
 if TYPE_CHECKING:
@@ -126,6 +129,7 @@ class Twin:
             return Random(f"{setup.seed} {part}")
 
         self._setup = setup
+        self._vehicle = make_vehicle(setup.robot)
         self._maker = maker
         self._kernel = make_kernel(
             setup.robot, setup.link.baud, rng("kernel"), setup.disturbances, setup.faults, board
@@ -143,6 +147,23 @@ class Twin:
         self._exposed: deque[tuple[Exposure, tuple[PoseTuple, ...]]] = deque()
         self._set_spans(math.inf)
         self._next_frame = self._shutter.next(self._stalls)
+        self._outside = self._open_outside(setup)
+        self._outside_told = False
+
+    def _open_outside(self, setup: TwinSetup) -> OutsidePlant | None:
+        """Have the robot's motion worked out by another program where the robot's file says so."""
+        if setup.robot.plant == BUILT_IN_PLANT:
+            return None
+        outside = OutsidePlant(setup.robot.plant, setup.robot, setup.start, setup.seed)
+        loads = [item.target for item in setup.disturbances if item.target != "battery_sag_v"]
+        stuck = [fault.kind for fault in setup.faults if fault.kind == "motor_stuck"]
+        try:
+            outside.check_takes([*loads, *stuck])
+        except BadInput:
+            outside.close()
+            raise
+        self._kernel.set_outside(outside.step, PERIOD_US)
+        return outside
 
     def now_s(self) -> float:
         """Return the virtual host clock."""
@@ -179,15 +200,12 @@ class Twin:
         """Return the true state now."""
         state = self._kernel.state()
         pose = Pose(*self._pose_at(self._now_s))
-        d0_m = self._setup.robot.d0_m
-        z1_m = (
-            pose.x_m + d0_m * math.cos(pose.theta_rad),
-            pose.y_m + d0_m * math.sin(pose.theta_rad),
-        )
-        return Truth(pose, state[3], state[5], z1_m)
+        return Truth(pose, state[3], state[5], self._vehicle.flat_output(pose))
 
     def close(self) -> None:
-        """Nothing is held that needs releasing."""
+        """End the program that works out the robot's motion, where there is one."""
+        if self._outside is not None:
+            self._outside.close()
 
     def deliver_to_board(self, t_s: float, data: bytes) -> None:
         """Let bytes reach the board's UART at `t_s`; in time order."""
@@ -209,6 +227,9 @@ class Twin:
             reached_us = self._kernel.advance(target_us)
         except RuntimeError as error:
             raise RigFault(f"twin: {error}; check the robot's parameters") from None
+        if self._outside is not None and self._outside.fault and not self._outside_told:
+            self._outside_told = True  # once: the board must be told to stop after it
+            raise RigFault(self._outside.fault)
         for t_us, data in self._kernel.take_sent():
             carried = self._up.carry(HOST_START_S + 1e-6 * t_us, data)
             if carried is not None:

@@ -7,6 +7,7 @@ pixel value is its reflectance times the local light. DN is the sensor's 8-bit s
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -112,13 +113,16 @@ class MarkConfig(Section):
 
 
 class MarksConfig(Section):
-    """The two colour marks; both lie flat at one height above the floor."""
+    """The colour marks, two or more; all lie flat at one height above the floor."""
 
     front: MarkConfig = Field(
         MarkConfig(colour=(0.07, 0.06, 0.62), x_m=0.08), description="matt red paper, front"
     )
     rear: MarkConfig = Field(
         MarkConfig(colour=(0.12, 0.42, 0.08), x_m=-0.08), description="matt green paper, rear"
+    )
+    more: tuple[MarkConfig, ...] = Field(
+        (), max_length=6, description="further marks, so that a covered one does not lose the robot"
     )
     diameter_m: float = quantity(
         "m", "16 px at 640 px: edge enough for 0.01 px of noise", 0.06, ge=0.005, le=0.5
@@ -138,6 +142,29 @@ class MarksConfig(Section):
     swapped_marks: bool = Field(
         False, description="fault: colours changed over on the robot, the host not told"
     )
+
+    @property
+    def all(self) -> tuple[MarkConfig, ...]:
+        """Return every mark, front and rear first."""
+        return (self.front, self.rear, *self.more)
+
+    @model_validator(mode="after")
+    def _more_are_told_apart(self) -> MarksConfig:
+        """Refuse a further mark that lies on another or has another's colour."""
+        for k in range(2, len(self.all)):
+            mark = self.all[k]
+            for other in self.all[:k]:
+                if math.dist((mark.x_m, mark.y_m), (other.x_m, other.y_m)) <= self.diameter_m:
+                    raise ValueError(
+                        f"more.{k - 2} lies on the mark at ({other.x_m:g}, {other.y_m:g}) m: centres "
+                        f"must be more than diameter_m = {self.diameter_m:g} m apart"
+                    )
+                if mark.colour == other.colour:
+                    raise ValueError(
+                        f"more.{k - 2} has the colour of the mark at ({other.x_m:g}, {other.y_m:g}) m; "
+                        "every mark needs its own"
+                    )
+        return self
 
 
 class TagConfig(Section):
@@ -168,11 +195,14 @@ class RobotLookConfig(Section):
     )
     wheelbase_m: float = quantity(
         "m",
-        "distance of front and rear wheels",
+        "distance of front and rear wheels; 0: one axle",
         0.15,
-        gt=0.0,
+        ge=0.0,
         le=1.0,
         source="thesis table 8.3, length a",
+    )
+    axle_x_m: float = quantity(
+        "m", "middle of the axles, or the one axle, in the body frame", 0.0, ge=-1.0, le=1.0
     )
     plate_colour: Colour = quantity("(ratio)", "matt black, as a marks' ground", (0.05, 0.05, 0.05))
     side_colour: Colour = quantity("(ratio)", "black in its own shade", (0.09, 0.09, 0.10))

@@ -191,6 +191,8 @@ def _child(node: Any, part: str) -> Any:
 
 def _is_kind(section: type[BaseModel], node: Any) -> bool:
     """Say whether a table belongs to a section: of a union, the one of its `kind`."""
+    if OpenSection in section.__bases__:  # its model is found by the table itself
+        return True
     kind = node.get("kind") if isinstance(node, Mapping) else None
     field = section.model_fields.get("kind")
     return kind is None or field is None or field.default in {kind, PydanticUndefined}

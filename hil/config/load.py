@@ -26,6 +26,10 @@ from hil.core.registry import is_file_name
 # Values that would be laid aside: the command's own option (in a campaign, its list) decides them.
 _BY_OPTION = {"board.LAW": "--inner", "control.outer": "--outer"}
 
+# Tables of a scenario that a file of their own may hold.
+_PARTS = ("robot", "camera")
+_SKID_STEER = "skid-steer"
+
 Tree = dict[str, Any]
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -66,15 +70,44 @@ def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
     if not overrides:
         return scenario
     tree = scenario.model_dump(mode="json")
+    files_named = [text for text in overrides if _part_of(text) is not None]
+    for text in files_named:
+        tree = _with_file(tree, text)
+    if files_named:  # with every value that a file leaves at its default
+        tree = build(Scenario, tree, "--set").model_dump(mode="json")
     # A name first: which settings there are depends on it.
     for text in sorted(
         overrides, key=lambda text: text.partition("=")[0].strip() not in BY_NAME_KEY
     ):
-        set_value(tree, text)
+        if text not in files_named:
+            set_value(tree, text)
     _fill_board(tree)
     changed = build(Scenario, tree, "--set")
     check_board(changed.board)
     return changed
+
+
+def _part_of(text: str) -> str | None:
+    """Return the part whose file KEY=VALUE names, None where it names a value."""
+    key = text.partition("=")[0].strip()
+    return next((part for part in _PARTS if key == f"{part}.file"), None)
+
+
+def _with_file(tree: Tree, text: str) -> Tree:
+    """Return the tree with a robot's or camera's file laid over it, where KEY=VALUE names one."""
+    part = _part_of(text)
+    if part is None:
+        return tree
+    value = parse_value(text.partition("=")[2])
+    return merge(tree, {part: _part_tree(str(value), part)})
+
+
+def _part_tree(name_or_path: str, part: str, above: tuple[str, ...] = ()) -> Tree:
+    """Return a robot's or camera's file; a robot that does not say its vehicle is a skid-steer."""
+    tree = read_tree(name_or_path, f"{part}s", above)
+    if part == "robot":
+        tree.setdefault("vehicle", {"kind": _SKID_STEER})
+    return tree
 
 
 def _fill_board(tree: Tree) -> None:
@@ -94,10 +127,10 @@ def read_tree(name_or_path: str, kind: str, above: tuple[str, ...] = ()) -> Tree
     above = (*above, name_or_path)
     text, where, folder = _read_text(name_or_path, kind)
     tree = parse_toml(text, str(where))
-    for part in ("robot", "camera"):
+    for part in _PARTS:
         if isinstance(tree.get(part), Mapping) and "file" in tree[part]:
             own = dict(tree[part])
-            below = read_tree(_beside(folder, str(own.pop("file"))), f"{part}s", above)
+            below = _part_tree(_beside(folder, str(own.pop("file"))), part, above)
             tree[part] = merge(below, own)
     _set_files_beside(tree, folder)
     base = tree.pop("base", None)
@@ -110,6 +143,7 @@ def read_tree(name_or_path: str, kind: str, above: tuple[str, ...] = ()) -> Tree
 # Values that name a registered thing, or a file that defines one.
 _PLUGIN_KEYS = (
     ("control", "outer"), ("control", "estimator"), ("camera", "localiser"), ("reference", "kind"),
+    ("vehicle", "kind"),
 )  # fmt: skip
 
 
@@ -119,6 +153,8 @@ _PLUGIN_LISTS = ("outer", "laws")
 
 def _set_files_beside(tree: Tree, folder: Path | None) -> None:
     """Make the path of a law's file and the like, named relative to the scenario's, whole; in place."""
+    if isinstance(tree.get("robot"), dict):
+        _set_files_beside(tree["robot"], folder)
     for table, key in _PLUGIN_KEYS:
         node = tree.get(table)
         if folder is not None and isinstance(node, dict) and is_file_name(str(node.get(key, ""))):
@@ -129,11 +165,13 @@ def _set_files_beside(tree: Tree, folder: Path | None) -> None:
             tree[key] = [
                 str(folder.resolve() / name) if is_file_name(str(name)) else name for name in names
             ]
+    if folder is not None and is_file_name(str(tree.get("plant", ""))):  # of a robot
+        tree["plant"] = str(folder.resolve() / tree["plant"])
 
 
 def _base_kind(base: str, kind: str) -> str:
-    """Return the kind of the file below: a scenario lies on another one or on a lab."""
-    if kind != "scenarios":
+    """Return the kind of the file below: a scenario or lab lies on either."""
+    if kind not in {"scenarios", "labs"}:
         return kind
     return "scenarios" if base in builtin_names("scenarios") else "labs"
 
@@ -173,7 +211,8 @@ def _read_text(name_or_path: str, kind: str) -> tuple[str, str, Path | None]:
 def merge(below: Tree, above: Tree) -> Tree:
     """Return `below` with the keys of `above` laid over it; tables merge, lists replace.
 
-    A table that changes its `kind` replaces the one below: its other keys belong to that kind.
+    A table that changes its `kind` replaces the one below: its other keys belong to that kind. So
+    does a robot of another kind of vehicle.
     """
     result = dict(below)
     for key, value in above.items():
@@ -186,6 +225,10 @@ def merge(below: Tree, above: Tree) -> Tree:
 
 
 def _changes_kind(old: Tree, new: Tree) -> bool:
+    if isinstance(new.get("vehicle"), dict) and "mass_kg" in old:
+        below = old.get("vehicle", {})
+        before = below.get("kind", _SKID_STEER) if isinstance(below, dict) else _SKID_STEER
+        return bool(new["vehicle"].get("kind", before) != before)
     return "kind" in new and new["kind"] != old.get("kind")
 
 

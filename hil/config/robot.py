@@ -7,12 +7,14 @@ Bounds stand here; the numbers and where each one comes from stand in the robot 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+import re
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, BaseModel, Field, SerializeAsAny, model_validator
 
-from hil.config.base import PlainName, Section, quantity, rounded_up
+from hil.config.base import OpenSection, PlainName, Section, quantity, rounded_up
 from hil.config.limits import board_table
+from hil.core.registries import VEHICLES
 
 # Wheels and reflected rotors of one side; the lightest toy has ten times as much.
 _LEAST_SIDE_KG_M2 = 1e-5
@@ -98,13 +100,70 @@ class BringUpConfig(Section):
     battery_v: float = quantity("V", "battery at full speed", gt=0, le=60)
 
 
+BUILT_IN_PLANT = "builtin"
+_PORT = re.compile(r"tcp:(127\.0\.0\.1|localhost):(\d{1,5})")
+
+
+def _plant(name: str) -> str:
+    """Refuse a plant that is not built in, no file, and no port of this machine."""
+    if name.startswith("tcp:"):
+        port = _PORT.fullmatch(name)
+        if not port or not 1 <= int(port[2]) <= 65_535:
+            raise ValueError(
+                "a plant is reached on this machine only: tcp:127.0.0.1:PORT, 1 to 65535"
+            )
+    elif name != BUILT_IN_PLANT and not name.endswith(".py"):
+        raise ValueError(f"choose {BUILT_IN_PLANT}, tcp:127.0.0.1:PORT or a file, ./my_plant.py")
+    return name
+
+
+PlantName = Annotated[str, AfterValidator(_plant)]
+
+
+class VehicleConfig(OpenSection):
+    """What kind of vehicle the robot is; each kind's own model lies on this one."""
+
+    kind: str = Field("skid-steer", description="kind of vehicle: a registered name or a file")
+
+    @classmethod
+    def model_for(cls, tree: Any) -> type[BaseModel]:
+        """Return the model of the kind that a table names; raises BadInput for an unknown one."""
+        return VEHICLES.get(str(tree.get("kind", "skid-steer"))).settings or cls
+
+    @classmethod
+    def models(cls) -> list[type[BaseModel]]:
+        """Return the models of all kinds."""
+        return [entry.settings for entry in VEHICLES.entries() if entry.settings is not None]
+
+
+class SkidSteerConfig(VehicleConfig):
+    """Two driven wheels a side; its axles are `front_axle_m` and `rear_axle_m` of the robot."""
+
+    kind: Literal["skid-steer"] = Field("skid-steer", description="of this vehicle")
+
+
+class DifferentialConfig(VehicleConfig):
+    """One driven wheel a side, d0 ahead of the centre of mass, and a castor behind them."""
+
+    kind: Literal["differential"] = Field("differential", description="of this vehicle")
+    castor_behind_m: float = quantity("m", "driven axle to the castor's foot", gt=0.005, le=2)
+    castor_friction_ratio: float = quantity(
+        "(ratio)", "friction of the castor's foot over its load", ge=0, le=1
+    )
+
+
 class RobotConfig(Section):
-    """A four-wheel skid-steer robot, two driven wheels a side (docs/twin.md)."""
+    """A robot with a left and a right driven side (docs/twin.md)."""
 
     name: PlainName = Field(min_length=1, max_length=60, description="of the robot, for people")
     variant: Literal["constrained", "slip", "lifted"] = Field(
         description="constrained: eta2 = -d0 theta_dot (2.31) and rolling wheels; slip: neither; "
         "lifted: on blocks, the wheels turn freely"
+    )
+    plant: PlantName = Field(
+        BUILT_IN_PLANT,
+        description="simulated targets: what works out the robot's motion: builtin, a file, or "
+        "tcp:127.0.0.1:PORT",
     )
     mass_kg: float = quantity("kg", "m, whole robot", ge=0.5, le=50)
     inertia_kg_m2: float = quantity(
@@ -112,9 +171,20 @@ class RobotConfig(Section):
     )
     wheel_radius_m: float = quantity("m", "r, of a wheel", ge=0.01, le=0.5)
     track_m: float = quantity("m", "W, distance of left and right wheels", ge=0.05, le=2)
-    front_axle_m: float = quantity("m", "a_f, centre of mass to front axle", ge=0.01, le=2)
-    rear_axle_m: float = quantity("m", "b, centre of mass to rear axle", ge=0.01, le=2)
-    d0_m: float = quantity("m", "d0 of the operative constraint (2.31)", ge=0.005, le=1)
+    vehicle: SerializeAsAny[VehicleConfig] = SkidSteerConfig()
+    front_axle_m: float | None = quantity(
+        "m", "skid-steer: a_f, centre of mass to front axle", None, ge=0.01, le=2
+    )
+    rear_axle_m: float | None = quantity(
+        "m", "skid-steer: b, centre of mass to rear axle", None, ge=0.01, le=2
+    )
+    d0_m: float = quantity(
+        "m",
+        "d0 of the operative constraint (2.31); differential: driven axle ahead of the "
+        "centre of mass",
+        ge=0.005,
+        le=1,
+    )
     wheel_inertia_kg_m2: float = quantity("kg m^2", "one wheel about its axle", ge=0, le=0.1)
     encoder_counts_per_turn: int = quantity(
         "counts/turn",
@@ -154,7 +224,8 @@ class RobotConfig(Section):
         """Wheels that turn by themselves are divided by it; less than this RK4 cannot follow."""
         motor = self.motor
         rotors = motor.per_side * motor.gear_ratio**2 * motor.rotor_inertia_kg_m2
-        side = rotors + 2.0 * self.wheel_inertia_kg_m2
+        wheels = 1.0 if isinstance(self.vehicle, DifferentialConfig) else 2.0
+        side = rotors + wheels * self.wheel_inertia_kg_m2
         if self.variant != "constrained" and side < _LEAST_SIDE_KG_M2:
             raise ValueError(
                 f"wheel_inertia_kg_m2 and motor.rotor_inertia_kg_m2 give a side {side:.2g} kg m^2, "
@@ -164,7 +235,29 @@ class RobotConfig(Section):
 
     @model_validator(mode="after")
     def _pivot_inside_the_wheelbase(self) -> Self:
-        wheelbase_m = self.front_axle_m + self.rear_axle_m
-        if self.d0_m >= wheelbase_m:
+        axles_m = {"front_axle_m": self.front_axle_m, "rear_axle_m": self.rear_axle_m}
+        if isinstance(self.vehicle, DifferentialConfig):
+            self._check_castor(self.vehicle.castor_behind_m, axles_m)
+            return self
+        for name, axle_m in axles_m.items():
+            if axle_m is None and isinstance(self.vehicle, SkidSteerConfig):
+                raise ValueError(
+                    f"{name} is missing; a skid-steer robot has two axles: give it, in m"
+                )
+        wheelbase_m = sum(axle_m or 0.0 for axle_m in axles_m.values())
+        if self.d0_m >= wheelbase_m > 0.0:
             raise ValueError(f"d0_m must be below the wheelbase of {wheelbase_m:.3f} m (2.31)")
         return self
+
+    def _check_castor(self, behind_m: float, axles_m: dict[str, float | None]) -> None:
+        for name, axle_m in axles_m.items():
+            if axle_m is not None:
+                raise ValueError(
+                    f"{name} = {axle_m:g} m belongs to a skid-steer robot; a differential one has its "
+                    "axle d0_m ahead of the centre of mass and vehicle.castor_behind_m: leave it out"
+                )
+        if self.d0_m >= behind_m:
+            raise ValueError(
+                f"d0_m must be below vehicle.castor_behind_m = {behind_m:g} m: the centre of mass lies "
+                "between axle and castor, or the robot falls over"
+            )

@@ -21,6 +21,7 @@ ESTIMATORS = Registry(
 )
 REFERENCES = Registry("reference", "skid_steer_hil.references", "hil.control.references", ("at",))
 LOCALISERS = Registry("localiser", "skid_steer_hil.localisers", "vision.localisers", ("locate",))
+VEHICLES = Registry("vehicle", "skid_steer_hil.vehicles", "hil.control.vehicles")
 
 # As `hil list` names them.
 BY_PLURAL = {
@@ -28,6 +29,7 @@ BY_PLURAL = {
     "estimators": ESTIMATORS,
     "references": REFERENCES,
     "localisers": LOCALISERS,
+    "vehicles": VEHICLES,
 }
 BY_KIND = {registry.kind: registry for registry in BY_PLURAL.values()}
 

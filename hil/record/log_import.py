@@ -28,8 +28,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hil.config.load import load_scenario
-from hil.control.estimators.geometry import BelievedGeometry
 from hil.control.references import make_reference
+from hil.control.vehicles.vehicle import make_vehicle
 from hil.record.log_csv import read_csv
 from hil.record.log_mapping import LogMapping, read_mapping
 from hil.record.log_signals import Signals
@@ -168,14 +168,14 @@ def _completed(signals: Signals, scenario: Scenario) -> dict[str, Array]:
         "delta1_y_m": z1[1] - goal[:, 1],
     }
     columns = {name: np.full(t_s.size, math.nan) for name in SAMPLE_NAMES} | derived | given
-    geometry = BelievedGeometry.of(robot)
+    vehicle = make_vehicle(robot)
     if "eta1_cmd_m_s" in given and "omega_cmd_left_rad_s" not in given:
         pairs = zip(columns["eta1_cmd_m_s"], columns["theta_dot_cmd_rad_s"], strict=True)
-        wheels = np.array([geometry.wheels(float(eta1), float(turn)) for eta1, turn in pairs])
+        wheels = np.array([vehicle.wheels(float(eta1), float(turn)) for eta1, turn in pairs])
         columns["omega_cmd_left_rad_s"], columns["omega_cmd_right_rad_s"] = wheels.T
     elif "omega_cmd_left_rad_s" in given and "eta1_cmd_m_s" not in given:
         pairs = zip(columns["omega_cmd_left_rad_s"], columns["omega_cmd_right_rad_s"], strict=True)
-        body = np.array([geometry.body(float(left), float(right)) for left, right in pairs])
+        body = np.array([vehicle.body(float(left), float(right)) for left, right in pairs])
         columns["eta1_cmd_m_s"], columns["theta_dot_cmd_rad_s"] = body.T
     return columns
 

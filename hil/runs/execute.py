@@ -14,16 +14,17 @@ import cv2
 from hil.analysis.metrics import LinkStats
 from hil.config.fit import check_fit
 from hil.config.limits import check_edges, wheel_speed_max_rad_s
-from hil.control.estimators.geometry import BelievedGeometry
+from hil.config.robot import BUILT_IN_PLANT
 from hil.control.estimators.making import make_estimator
 from hil.control.laws.hold import HoldAtGoal
 from hil.control.laws.making import make_outer_law
 from hil.control.laws.within import WithinWheelSpeed
 from hil.control.references import make_reference
 from hil.control.task_notes import notes
+from hil.control.vehicles.vehicle import make_vehicle
 from hil.core.clocks import CameraClock
-from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES
-from hil.core.registry import BUILT_IN
+from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES, VEHICLES
+from hil.core.registry import BUILT_IN, Entry, SourceText
 from hil.record.manifest import Manifest, Plugin, TraceTerm, collect_versions, git_revision
 from hil.record.memory import MemoryRecorder
 from hil.record.recorder import Recorder
@@ -193,26 +194,38 @@ def plugins_of(spec: RunSpec) -> list[Plugin]:
         (ESTIMATORS, control.estimator),
         (LOCALISERS, spec.scenario.camera.localiser),
         (REFERENCES, spec.scenario.reference.kind),
+        (VEHICLES, spec.scenario.robot.vehicle.kind),
     )
     entries = [(registry.kind, registry.get(name)) for registry, name in used]
-    return [Plugin.of(kind, entry) for kind, entry in entries if entry.origin != BUILT_IN]
+    found = [Plugin.of(kind, entry) for kind, entry in entries if entry.origin != BUILT_IN]
+    return found + _plant_of(spec)
+
+
+def _plant_of(spec: RunSpec) -> list[Plugin]:
+    """Return what worked out the robot's motion where the harness did not, for the record."""
+    where = spec.scenario.robot.plant
+    if spec.target not in SIMULATED or where == BUILT_IN_PLANT:
+        return []
+    path = Path(where)
+    text = None if where.startswith("tcp:") or not path.is_file() else path.read_text("utf-8")
+    source = None if text is None else SourceText(path, text)
+    return [Plugin.of("plant", Entry(where, type(None), "", origin=where, source=source))]
 
 
 def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None = None) -> Parts:
     """Return the parts of a session over `rig`; `law` is another one than a new one of the spec."""
     scenario, control = spec.scenario, spec.scenario.control
-    robot = scenario.robot
-    geometry = BelievedGeometry.of(robot)
+    vehicle = make_vehicle(scenario.robot)
     timeline = Timeline(recorder, _unix_us)
     return Parts(
         rig=rig,
         link=BoardLink(rig.stream, timeline.link_frame),
         camera_clock=CameraClock(scenario.camera.latency_s),
         localiser=make_localiser(scenario.camera),
-        estimator=make_estimator(control.estimator, control, geometry),
-        law=WithinWheelSpeed(law or make_law(spec), geometry, wheel_speed_max_rad_s(scenario)),
+        estimator=make_estimator(control.estimator, control, vehicle.geometry),
+        law=WithinWheelSpeed(law or make_law(spec), vehicle, wheel_speed_max_rad_s(scenario)),
         reference=make_reference(scenario.reference),
-        geometry=geometry,
+        vehicle=vehicle,
         recorder=recorder,
         timeline=timeline,
         own_terms=tuple(OUTER_LAWS.get(spec.outer).trace),

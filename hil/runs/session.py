@@ -20,8 +20,8 @@ from hil.wire.refusal import refused_set_point
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
-    from hil.control.estimators.geometry import BelievedGeometry
     from hil.control.references import Reference
+    from hil.control.vehicles.vehicle import Vehicle
     from hil.core.clocks import CameraClock
     from hil.core.rig import Frame, Rig
     from hil.core.types import Estimate, Estimator, OuterCommand, OuterLaw, ReferenceState
@@ -57,7 +57,7 @@ class Parts:
     estimator: Estimator
     law: OuterLaw
     reference: Reference
-    geometry: BelievedGeometry
+    vehicle: Vehicle
     recorder: RunSink
     timeline: Timeline
     own_terms: tuple[str, ...] = ()  # of the law's trace, kept in columns of their own
@@ -342,7 +342,7 @@ class Session:
     # -- out -----------------------------------------------------------------------------------
 
     def _command_wheels(self, now_s: float, command: OuterCommand) -> tuple[float, float]:
-        left, right = self._parts.geometry.wheels(command.eta1_m_s, command.theta_dot_rad_s)
+        left, right = self._parts.vehicle.wheels(command.eta1_m_s, command.theta_dot_rad_s)
         self._send_wheels(left, right)
         self._parts.estimator.on_command(
             now_s + self._uplink_s, command.eta1_m_s, command.theta_dot_rad_s

@@ -2,6 +2,7 @@
 // Signatures and units for Python readers: sim_twin/_native.pyi.
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/array.h>
+#include <nanobind/stl/function.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -57,6 +58,8 @@ void bind_plant(nb::module_& m) {
 #define X(name) .def_rw(#name, &PlantParams::name)
       TWIN_PLANT_PARAMETERS(X)
 #undef X
+      .def_rw("castor", &PlantParams::castor)
+      .def_rw("castor_friction_ratio", &PlantParams::castor_friction_ratio)
       .def_rw("slip", &PlantParams::slip)
       .def_rw("lifted", &PlantParams::lifted);
 
@@ -134,6 +137,19 @@ void make_kernel(Kernel* self, const PlantParams& params, std::int64_t step_us, 
   new (self) Kernel(params, {step_us, counts_per_turn}, *static_cast<BoardPointer*>(board.data()));
 }
 
+// Called with (t_us, (left V, right V), loads, (left, right) jam in N m s/rad).
+using OutsideFunction = std::function<twin::StateVector(
+    std::int64_t, std::array<double, 2>, twin::LoadVector, std::array<double, 2>)>;
+
+void set_outside(Kernel& kernel, OutsideFunction outside, std::int64_t period_us) {
+  kernel.set_outside(
+      [outside](std::int64_t t_us, const twin::Pair& volts, const twin::LoadVector& loads,
+                const twin::Pair& jam) {
+        return outside(t_us, {volts[0], volts[1]}, loads, {jam[0], jam[1]});
+      },
+      period_us);
+}
+
 void bind_kernel(nb::module_& m) {
   m.def("disturbance_value",
         [](int shape, double amplitude, double start_s, double end_s, double frequency_hz,
@@ -176,6 +192,7 @@ void bind_kernel(nb::module_& m) {
              k.add_fault({static_cast<twin::FaultKind>(kind), left, right, start_s, end_s});
            },
            "kind"_a, "left"_a, "right"_a, "start_s"_a, "end_s"_a)
+      .def("set_outside", &set_outside, "outside"_a, "period_us"_a)
       .def("begin", &Kernel::begin, "t_us"_a)
       .def("advance", &Kernel::advance, "t_us"_a)
       .def("receive",

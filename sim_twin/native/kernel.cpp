@@ -67,6 +67,7 @@ void Kernel::reset(double x_m, double y_m, double theta_rad) {
   for (Encoder& encoder : encoders_) encoder.reset(0.0);
   time_us_ = 0;
   begin_us_ = kNever_us;
+  outside_from_us_ = outside_until_us_ = 0;
   pose_count_ = 0;
   drive_ = {};
   battery_v_ = plant_.battery_v(drive_, 0.0);
@@ -109,8 +110,46 @@ void Kernel::set_drive() {
   }
 }
 
+void Kernel::set_outside(OutsidePlant outside, std::int64_t period_us) {
+  if (period_us < options_.step_us || period_us % options_.step_us != 0) {
+    throw std::invalid_argument("the period must be a multiple of step_us");
+  }
+  outside_ = std::move(outside);
+  outside_period_us_ = period_us;
+}
+
+LoadVector Kernel::loads_now() const {
+  if (disturbances_.empty() || time_us_ < begin_us_) return LoadVector{};
+  const StateVector& x = plant_.state();
+  return disturbances_.loads(1e-6 * static_cast<double>(time_us_ - begin_us_), x[kX], x[kY]);
+}
+
+void Kernel::follow_outside(double h_s) {
+  if (time_us_ >= outside_until_us_) {
+    const LoadVector loads = loads_now();
+    outside_from_ = plant_.state();
+    sag_v_ = loads[kBatterySag];
+    outside_to_ = outside_(time_us_, drive_.duty * battery_v_, loads, drive_.jam);
+    outside_from_us_ = time_us_;
+    outside_until_us_ = time_us_ + outside_period_us_;
+  }
+  const double charge = plant_.charge_after(h_s, drive_);
+  const auto done_us = static_cast<double>(time_us_ + options_.step_us - outside_from_us_);
+  const double share = done_us / static_cast<double>(outside_period_us_);
+  StateVector& x = plant_.state();
+  for (int i = 0; i < kStates; ++i) {
+    x[i] = share < 1.0 ? outside_from_[i] + share * (outside_to_[i] - outside_from_[i])
+                       : outside_to_[i];
+  }
+  x[kCharge] = charge;
+}
+
 void Kernel::integrate() {
   const double h_s = 1e-6 * static_cast<double>(options_.step_us);
+  if (outside_) {
+    follow_outside(h_s);
+    return;
+  }
   sag_v_ = 0.0;
   if (disturbances_.empty() || time_us_ < begin_us_) {
     constexpr LoadVector kNone{};

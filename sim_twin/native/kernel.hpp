@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -34,6 +35,12 @@ class Encoder {
   std::uint8_t pins_ = 0;
 };
 
+// A robot whose motion somebody else works out: given the time, the motors' voltages, what else acts
+// on it, and the damping of a jammed gear, it returns the state one period later (its charge is not
+// looked at).
+using OutsidePlant = std::function<StateVector(std::int64_t t_us, const Pair& volts,
+                                               const LoadVector& loads, const Pair& jam)>;
+
 struct PoseSample {
   double x_m = 0.0, y_m = 0.0, theta_rad = 0.0;
 };
@@ -55,6 +62,9 @@ class Kernel {
   // Event times count from t_us. Before it there are no disturbances, and the faults of time 0.
   void begin(std::int64_t t_us) { begin_us_ = t_us; }
 
+  // Have the robot's motion from outside, asked for once a period; between, it runs straight on.
+  void set_outside(OutsidePlant outside, std::int64_t period_us);
+
   // Run until t_us is reached, or to the end of the step in which the board has sent something.
   // Returns the time reached. Throws when the state diverges.
   std::int64_t advance(std::int64_t t_us);
@@ -74,6 +84,8 @@ class Kernel {
   void follow_reset_line();
   void set_drive();
   void integrate();
+  LoadVector loads_now() const;
+  void follow_outside(double h_s);
   void remember();
 
   static constexpr std::int64_t kNever_us = std::int64_t{1} << 60;
@@ -81,6 +93,10 @@ class Kernel {
   static constexpr std::size_t kPoses = 4096;
 
   Plant plant_;
+  OutsidePlant outside_;
+  std::int64_t outside_period_us_ = 0;
+  std::int64_t outside_from_us_ = 0, outside_until_us_ = 0;
+  StateVector outside_from_{}, outside_to_{};
   KernelOptions options_;
   std::shared_ptr<BoardSide> board_;
   Disturbances disturbances_;

@@ -48,13 +48,20 @@ Plant::Derived Plant::derive(const PlantParams& p) {
   d.per_inductance = 1.0 / p.motor_inductance_h;
   d.per_stribeck = 1.0 / p.motor_stribeck_rad_s;
   d.per_charge = 1.0 / (3600.0 * p.battery_capacity_a_h);
-  d.side_inertia = p.motor_per_side * rotor + 2.0 * p.wheel_inertia_kg_m2;  // two wheels a side
+  d.side_inertia = p.motor_per_side * rotor + (p.castor ? 1.0 : 2.0) * p.wheel_inertia_kg_m2;
   d.emf_v_s = p.motor_emf_constant_v_s_rad * p.motor_gear_ratio;
   d.gear_n_m_a = p.motor_torque_constant_n_m_a * p.motor_gear_ratio;
   d.weight_n = p.mass_kg * kGravity;
   d.roll_n = 0.5 * p.floor_rolling_ratio * d.weight_n;
   d.slide_front_n = p.floor_friction_ratio * d.weight_n * p.rear_axle_m / wheelbase_m;
   d.slide_rear_n = p.floor_friction_ratio * d.weight_n * p.front_axle_m / wheelbase_m;
+  d.castor_n = 0.0;
+  if (p.castor) {  // it has the rear axle's load and neither its grip nor its rolling resistance
+    const double castor_ratio = p.front_axle_m / wheelbase_m;
+    d.roll_n *= 1.0 - castor_ratio;
+    d.slide_rear_n = 0.0;
+    d.castor_n = p.castor_friction_ratio * d.weight_n * castor_ratio;
+  }
   const double rim_kg = 2.0 * d.side_inertia * d.per_radius * d.per_radius;
   d.per_mass_rim = 1.0 / (p.mass_kg + rim_kg);
   d.per_inertia_rim = 1.0 / (p.inertia_kg_m2 + p.mass_kg * p.d0_m * p.d0_m +
@@ -72,6 +79,11 @@ void Plant::reset(double x_m, double y_m, double theta_rad) {
 
 double Plant::battery_v(const Drive& drive, double sag_v) const {
   return battery_v(x_[kCharge], draw_a(Pair{x_[kCurrentL], x_[kCurrentR]}, drive), sag_v);
+}
+
+double Plant::charge_after(double h_s, const Drive& drive) const {
+  const Pair current_a = {x_[kCurrentL], x_[kCurrentR]};
+  return x_[kCharge] - h_s * d_.per_charge * draw_a(current_a, drive);
 }
 
 // The bridge draws duty * current from the battery (power in = power out, drop taken at the motor).
@@ -190,8 +202,13 @@ Plant::Acceleration Plant::constrained(const PairedState& x, const Sides& both,
   const double push_y = load[kForceLeft] + m * gravity[1];
   Acceleration acc;
   acc.eta1_dot = (sum(rim_n) + push_x + m * eta2 * w) * d_.per_mass_rim + load[kAccForward];
-  const double moment = half * (rim_n[1] - rim_n[0]) - scrub_n_m + load[kTorqueYaw] +
+  double moment = half * (rim_n[1] - rim_n[0]) - scrub_n_m + load[kTorqueYaw] +
                         d0 * (lateral_n - push_y + m * eta1 * w);
+  if (p_.castor) {
+    const Pair drag_n = castor_drag(x, grip(load), p_.floor_smoothing_m_s);
+    acc.eta1_dot -= drag_n[0] * d_.per_mass_rim;
+    moment += (d0 + p_.rear_axle_m) * drag_n[1];  // on the arm from the point without lateral speed
+  }
   acc.theta_ddot = moment * d_.per_inertia_rim + load[kAccYaw] - load[kAccLateral] / d0;
   acc.eta2_dot = -d0 * acc.theta_ddot;
   acc.omega_dot = rolling(acc.eta1_dot, acc.theta_ddot);
@@ -223,14 +240,27 @@ Plant::Acceleration Plant::slipping(const PairedState& x, const Sides& both,
     moment -= axle_x[axle] * sum(share) * slip_y;
   }
   moment -= sum(y * drive_n);
+  Pair body_n = {sum(drive_n), sum(side_n)};
+  if (p_.castor) {
+    const Pair drag_n = castor_drag(x, grip(load), v_s);
+    body_n -= drag_n;
+    moment += p_.rear_axle_m * drag_n[1];
+  }
   const Pair rim_n = grip(load) * d_.roll_n * both.rolling_sign + drive_n;
   Acceleration acc;
   acc.omega_dot = (both.torque_n_m - r * rim_n) / d_.side_inertia;
   acc.eta1_dot =
-      (sum(drive_n) + load[kForceForward]) / m + gravity[0] + eta2 * w + load[kAccForward];
-  acc.eta2_dot = (sum(side_n) + load[kForceLeft]) / m + gravity[1] - eta1 * w + load[kAccLateral];
+      (body_n[0] + load[kForceForward]) / m + gravity[0] + eta2 * w + load[kAccForward];
+  acc.eta2_dot = (body_n[1] + load[kForceLeft]) / m + gravity[1] - eta1 * w + load[kAccLateral];
   acc.theta_ddot = (moment + load[kTorqueYaw]) / p_.inertia_kg_m2 + load[kAccYaw];
   return acc;
+}
+
+// Friction against the motion of the castor's foot over the floor, alike in every direction.
+Pair Plant::castor_drag(const PairedState& x, double grip_ratio, double v_s) const {
+  const Pair foot_m_s = x[kEta] + Pair{0.0, -p_.rear_axle_m * x[kTurn][1]};
+  const double v2 = foot_m_s[0] * foot_m_s[0] + foot_m_s[1] * foot_m_s[1];
+  return grip_ratio * d_.castor_n / std::sqrt(v2 + v_s * v_s) * foot_m_s;
 }
 
 // On blocks: each side turns its own wheels and rotors, and nothing pushes the body.

@@ -31,6 +31,10 @@ struct PlantParams {
 #define X(name) double name = 0.0;
   TWIN_PLANT_PARAMETERS(X)
 #undef X
+  // Skid steer: two wheels a side, one on each axle. Differential drive: one wheel a side on the
+  // front axle, and a castor where the rear axle would be.
+  bool castor = false;
+  double castor_friction_ratio = 0.0;
   bool slip = false;    // false: operative constraint (2.31) and rolling wheels
   bool lifted = false;  // wheels off the floor: they turn, the body stands
 };
@@ -106,6 +110,7 @@ class Plant {
   const StateVector& state() const { return x_; }
   StateVector& state() { return x_; }
   double battery_v(const Drive& drive, double sag_v) const;  // at the terminals, now
+  double charge_after(double h_s, const Drive& drive) const; // at the current drawn now
   StateVector derivative(const StateVector& x, const Drive& drive, const LoadVector& load) const;
 
  private:
@@ -127,7 +132,8 @@ class Plant {
     double emf_v_s, gear_n_m_a;       // V per rad/s and N m per A at the wheel
     double weight_n;                  // m g
     double roll_n;                    // rolling resistance of one side
-    double slide_front_n, slide_rear_n;   // sliding friction of the two front, two rear wheels
+    double slide_front_n, slide_rear_n;   // sliding friction of the wheels in front, in the rear
+    double castor_n;                      // friction of the castor
     double per_mass_rim, per_inertia_rim; // 1 / (m + rims), 1 / (I + m d0^2 + rims): (S'MS)^-1
   };
 
@@ -148,6 +154,7 @@ class Plant {
   Acceleration slipping(const PairedState& x, const Sides& both, const LoadVector& load,
                         const double* gravity) const;
   Acceleration hanging(const Sides& both) const;
+  Pair castor_drag(const PairedState& x, double grip_ratio, double v_s) const;
   Pair rolling(double eta1, double w) const;  // wheel speeds, or their rates from the body's
 
   PlantParams p_;

@@ -68,7 +68,8 @@ Renderer::Renderer(const View& view, const Scene& scene, const Robot& robot, uin
         colour_of_id_.push_back(patch.colour);
         mark_id_.push_back(patch.mark);
     }
-    robot_radius_ = std::hypot(std::max(robot.half_length, robot.half_base + robot.wheel_radius),
+    const float reach_x = std::fabs(robot.axle_x) + robot.half_base + robot.wheel_radius;
+    robot_radius_ = std::hypot(std::max(robot.half_length, reach_x),
                                std::max(robot.half_width, robot.half_track + robot.wheel_half_width));
     robot_height_ = robot.top;
     for (const Bar& bar : scene.bars) {

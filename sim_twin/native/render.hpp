@@ -54,6 +54,7 @@ struct Bar {
 struct Robot {
     float half_length = 0, half_width = 0, bottom = 0, top = 0;  // body box, m
     float wheel_radius = 0, wheel_half_width = 0, half_track = 0, half_base = 0;  // m
+    float axle_x = 0;  // middle of the axles, m
     Colour plate{}, side{}, tyre{}, hub{};
     std::vector<Patch> patches;  // the last one drawn lies on top
     Grid tag;

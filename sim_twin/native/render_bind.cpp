@@ -95,6 +95,7 @@ void bind_render(nb::module_& m) {
         .def_rw("wheel_radius", &Robot::wheel_radius)
         .def_rw("wheel_half_width", &Robot::wheel_half_width)
         .def_rw("half_track", &Robot::half_track).def_rw("half_base", &Robot::half_base)
+        .def_rw("axle_x", &Robot::axle_x)
         .def_rw("plate", &Robot::plate).def_rw("side", &Robot::side)
         .def_rw("tyre", &Robot::tyre).def_rw("hub", &Robot::hub)
         .def_rw("patches", &Robot::patches).def_rw("tag", &Robot::tag);

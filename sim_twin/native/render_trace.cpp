@@ -106,7 +106,7 @@ uint8_t Renderer::trace_sides(const Sight& body) const {
         id = ID_SIDE;
     }
     for (int wheel = 0; wheel < 4; ++wheel) {
-        const float xw = wheel & 1 ? robot_.half_base : -robot_.half_base;
+        const float xw = robot_.axle_x + (wheel & 1 ? robot_.half_base : -robot_.half_base);
         const float yw = wheel & 2 ? robot_.half_track : -robot_.half_track;
         const Sight local{body.x - xw, body.y - yw, body.lx, body.ly};
         const float r = robot_.wheel_radius;
@@ -132,7 +132,8 @@ uint8_t Renderer::trace(const Sight& world, const Pose& pose) const {
     if (std::fabs(x) < robot_.half_length && std::fabs(y) < robot_.half_width)
         return trace_top(x, y);
     // Nothing but bars reaches farther than these at any height up to the top.
-    const float reach_x = std::max(robot_.half_length, robot_.half_base + robot_.wheel_radius);
+    const float reach_x = std::max(
+        robot_.half_length, std::fabs(robot_.axle_x) + robot_.half_base + robot_.wheel_radius);
     const float reach_y = std::max(robot_.half_width, robot_.half_track + robot_.wheel_half_width);
     const float up = 0.5f * robot_.top;
     if (std::fabs(body.x + body.lx * up) > reach_x + std::fabs(body.lx) * up ||

@@ -23,6 +23,7 @@ from hil.core.types import Pose, PoseMeasurement, wrap_pi
 from vision.camera import CameraModel
 from vision.camera_setup import camera_model
 from vision.disc_fit import Disc, Marks, Point, RimFitter
+from vision.tracker import Localiser
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -300,6 +301,10 @@ def _response(mark: MarkConfig) -> Array:
 
 
 @LOCALISERS.register("marks", summary="colour marks on the robot's plate, as in the thesis")
-def make_marks(camera: CameraConfig) -> MarkLocaliser:
+def make_marks(camera: CameraConfig) -> Localiser:
     """Return the localiser of the colour marks that a camera's file describes."""
+    if camera.marks.more:
+        from vision.many_marks import ManyMarks  # noqa: PLC0415 - it is made of this module's
+
+        return ManyMarks(camera)
     return MarkLocaliser(camera_model(camera), camera.marks)

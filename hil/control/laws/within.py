@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from hil.core.types import OuterCommand
 
 if TYPE_CHECKING:
-    from hil.control.estimators.geometry import BelievedGeometry
+    from hil.control.vehicles.vehicle import Vehicle
     from hil.core.types import Estimate, OuterLaw, ReferenceState
 
 # Set-points go out as 32-bit floats, whose rounding must not lift them over the bound.
@@ -24,9 +24,9 @@ class WithinWheelSpeed:
     `omega_max_rad_s` bounds the wheel speeds. A command within the bound passes as it is.
     """
 
-    def __init__(self, law: OuterLaw, geometry: BelievedGeometry, omega_max_rad_s: float) -> None:
+    def __init__(self, law: OuterLaw, vehicle: Vehicle, omega_max_rad_s: float) -> None:
         self._law = law
-        self._geometry = geometry
+        self._vehicle = vehicle
         self._omega_max_rad_s = omega_max_rad_s
 
     def reset(self, reference: ReferenceState, estimate: Estimate) -> None:
@@ -36,7 +36,7 @@ class WithinWheelSpeed:
     def step(self, reference: ReferenceState, estimate: Estimate, dt_s: float) -> OuterCommand:
         """Return the law's command, scaled where a wheel would be asked more than the bound."""
         command = self._law.step(reference, estimate, dt_s)
-        left, right = self._geometry.wheels(command.eta1_m_s, command.theta_dot_rad_s)
+        left, right = self._vehicle.wheels(command.eta1_m_s, command.theta_dot_rad_s)
         fastest = max(abs(left), abs(right))
         if not fastest > self._omega_max_rad_s:
             return command
