@@ -95,6 +95,24 @@ class BringUpConfig(Section):
     battery_v: float = quantity("V", "battery at full speed", gt=0, le=60)
 
 
+class FittedValue(Section):
+    """A value that a log tells, with its 95 % interval; the unit stands in its name."""
+
+    value: float
+    low: float
+    high: float
+
+
+class LogFitConfig(Section):
+    """What `hil fit` found in a log: the answer to commands of the body, as a twin of it needs it."""
+
+    log: str = Field(max_length=300, description="name of the log's file")
+    sha256: str = Field(max_length=64, description="of the log's file")
+    twin: dict[str, float] = Field(description="every parameter of the fitted twin, told or usual")
+    told: dict[str, FittedValue] = Field(description="what the log tells")
+    not_told: tuple[str, ...] = Field((), description="what it does not; the twin has usual values")
+
+
 class RobotConfig(Section):
     """A four-wheel skid-steer robot, two driven wheels a side (control.md section 1)."""
 
@@ -127,6 +145,7 @@ class RobotConfig(Section):
     battery: BatteryConfig
     floor: FloorConfig
     bring_up: BringUpConfig | None = Field(None, description="measured, for people to compare with")
+    log_fit: LogFitConfig | None = Field(None, description="found in a log by hil fit")
 
     @model_validator(mode="after")
     def _current_slow_enough(self) -> Self:
