@@ -23,6 +23,7 @@ COMMANDS = {
     "compare": ("hil.cli.compare", "Compare recorded runs: table, JSON and HTML report."),
     "replay": ("hil.cli.replay", "Replay a record exactly, or with another law as its shadow."),
     "import": ("hil.cli.importing", "Make a record of a MAVLink .tlog or a CSV file."),
+    "fit": ("hil.cli.fit", "Find what a log tells of a robot; write its robot file."),
     "view": ("hil.cli.view", "Open recorded runs in the viewer."),
     "sweep": ("hil.cli.sweep", "Run a campaign over grids, lists and distributions; draw maps."),
     "tune": ("hil.cli.tune", "Tune the gains of both laws by one procedure and budget."),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -109,17 +109,13 @@ def estimate(
     `floor` is what numbers alone (cells, rounding) leave unknown, by parameter, as a half interval.
     """
     values = _best_start(parameters, residual, starts)
-    free = [item for item in parameters]
+    free = list(parameters)
     fixed: dict[str, tuple[float, str]] = {}
     reaches: dict[str, float] = {}
     while True:
         values, jacobian, rest = _search(free, residual, values)
         reach = _reach(jacobian, rest, window)
-        extra = _from_fixed(parameters, len(free), fixed, residual, values, jacobian)
-        reaches = {
-            item.name: math.sqrt(reach[k] ** 2 + floor.get(item.name, 0.0) ** 2 + extra[k])
-            for k, item in enumerate(free)
-        }
+        reaches = {item.name: float(reach[k]) for k, item in enumerate(free)}
         worst = _least_known([item for item in free if not item.main], values, reaches)
         if worst is None:
             break
@@ -127,6 +123,9 @@ def estimate(
         fixed[worst.name] = (could, f"taken as {worst.usual:g} {worst.unit}".rstrip())
         values = values | {worst.name: worst.usual}
         free = [item for item in free if item.name != worst.name]
+    extra = _from_fixed(parameters, len(free), fixed, residual, values, jacobian)
+    for k, item in enumerate(free):
+        reaches[item.name] = math.hypot(reach[k], floor.get(item.name, 0.0), math.sqrt(extra[k]))
     found = []
     for item in parameters:
         if item.name in fixed:
@@ -134,6 +133,13 @@ def estimate(
         else:
             found.append(_told(item, values[item.name], reaches[item.name]))
     return Found(values, tuple(found), int(np.unique(window).size))
+
+
+def first_values(
+    parameters: Sequence[Parameter], residual: Residual, starts: Sequence[Points]
+) -> dict[str, float]:
+    """Return the best values without intervals, to learn from them how large the noise is."""
+    return _search(parameters, residual, _best_start(parameters, residual, starts))[0]
 
 
 def _told(item: Parameter, value: float, reach: float) -> Estimate:
@@ -217,6 +223,7 @@ def _search(
     found = least_squares(
         of, inside, jac=slopes, bounds=(low, high), loss="soft_l1", f_scale=_LOSS_AT,
         x_scale=np.array([max(item.known_to, item.step) for item in free]), max_nfev=_MOST_STEPS,
+        ftol=1e-7, xtol=1e-6, gtol=1e-6,
     )  # fmt: skip
     rest = of(found.x)
     weight = (1.0 + (rest / _LOSS_AT) ** 2) ** -0.25
@@ -276,8 +283,3 @@ def _from_fixed(
         )
         total += (whole @ (column / (up - down)) * could) ** 2
     return total
-
-
-def with_note(item: Estimate, note: str) -> Estimate:
-    """Return an estimate with another note."""
-    return replace(item, note=note)

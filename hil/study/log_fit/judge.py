@@ -43,6 +43,13 @@ class Score:
             "position_at_end_m": list(self.per_window_end_m),
         }
 
+    def text(self) -> str:
+        """Return the score in words."""
+        heading = ""
+        if math.isfinite(self.heading_end_rad):
+            heading = f", heading {math.degrees(self.heading_end_rad):.2f} deg at its end"
+        return f"{1e3 * self.position_m:.1f} mm ({1e3 * self.position_end_m:.1f} mm){heading}"
+
 
 def scores(
     poses: Poses,

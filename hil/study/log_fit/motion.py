@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hil.study.log_fit.estimate import Found, Parameter, estimate
+from hil.study.log_fit.estimate import Found, Parameter, estimate, first_values
 from hil.study.log_fit.model import CELL_S, Grid, Track, body_track, held_means, odometry_track
 from hil.study.log_fit.windows import Eye, Mount
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 # Noise of poses at first; then what the first fit leaves.
 _SIGMA_M, _SIGMA_RAD = 0.005, 0.02
 _LEAST_SIGMA_M, _LEAST_SIGMA_RAD = 1e-4, 1e-4
-_ROUNDS = 2
 # Largest share of a command that a dead zone may be, and how long a robot may take to answer.
 _MOST_ZONE = 0.8
 _LONGEST_LAG_S, _LONGEST_DEAD_S = 3.0, 1.5
@@ -34,11 +33,11 @@ _FLOOR_S, _FLOOR_RATIO = 0.1 * CELL_S, 2e-4
 
 MOUNT = (
     Parameter("pose_ahead_m", "m", "where the pose is taken, ahead of the wheels' middle", 0.0,
-              -0.6, 0.6, 0.02, 1e-3, could_be=0.3),
+              -0.6, 0.6, 0.02, 1e-3, could_be=0.15),
     Parameter("pose_left_m", "m", "the same, to the left", 0.0, -0.6, 0.6, 0.02, 1e-3,
-              could_be=0.1),
+              could_be=0.03),
     Parameter("heading_offset_rad", "rad", "heading seen less the direction of driving", 0.0, -1.6,
-              1.6, 0.02, 1e-3, could_be=0.1),
+              1.6, 0.02, 1e-3, could_be=0.03),
 )  # fmt: skip
 SCALES = (
     Parameter("distance_scale_ratio", "ratio", "way driven over way asked", 1.0, -60.0, 60.0, 0.15,
@@ -46,7 +45,7 @@ SCALES = (
     Parameter("turn_scale_ratio", "ratio", "turn made over turn asked", 1.0, -60.0, 60.0, 0.15,
               1e-3, share=0.15, main=True),
     Parameter("veer_rad_m", "rad/m", "turn to the left per way driven straight", 0.0, -5.0, 5.0,
-              0.2, 1e-3, could_be=0.2),
+              0.2, 1e-3, could_be=0.05),
 )  # fmt: skip
 
 
@@ -57,16 +56,16 @@ def body_parameters(command: Pair2) -> tuple[Parameter, ...]:
     return (
         *SCALES,
         Parameter("forward_lag_s", "s", "first-order time constant of the forward speed", 0.0, 0.0,
-                  _LONGEST_LAG_S, 0.06, 2e-3, share=0.3, could_be=0.5),
+                  _LONGEST_LAG_S, 0.06, 2e-3, share=0.3, could_be=0.2),
         Parameter("turn_lag_s", "s", "first-order time constant of the turn rate", 0.0, 0.0,
-                  _LONGEST_LAG_S, 0.06, 2e-3, share=0.3, could_be=0.5),
+                  _LONGEST_LAG_S, 0.06, 2e-3, share=0.3, could_be=0.2),
         Parameter("dead_time_s", "s", "from a command as logged to its effect as seen", 0.0, 0.0,
-                  _LONGEST_DEAD_S, 0.06, 2e-3, share=0.3, could_be=0.5),
+                  _LONGEST_DEAD_S, 0.06, 2e-3, share=0.3, could_be=0.2),
         Parameter("forward_dead_zone_m_s", "m/s", "command up to which nothing drives; more is less "
                   "by as much", 0.0, 0.0, forward, 0.1 * forward, 0.002 * forward,
-                  share=0.5, could_be=0.25 * forward),
+                  share=0.5, could_be=0.06 * forward),
         Parameter("turn_dead_zone_rad_s", "rad/s", "the same for turning", 0.0, 0.0, turn,
-                  0.1 * turn, 0.002 * turn, share=0.5, could_be=0.25 * turn),
+                  0.1 * turn, 0.002 * turn, share=0.5, could_be=0.06 * turn),
         *MOUNT,
     )  # fmt: skip
 
@@ -75,7 +74,7 @@ def odometry_parameters() -> tuple[Parameter, ...]:
     """Return what wheel speeds and poses together may tell."""
     delay = Parameter(
         "pose_delay_s", "s", "pose as logged behind the wheel speeds as logged", 0.0, -1.0, 1.0,
-        0.06, 2e-3, share=0.3, could_be=0.3,
+        0.06, 2e-3, share=0.3, could_be=0.2,
     )  # fmt: skip
     return (*SCALES, delay, *MOUNT)
 
@@ -125,7 +124,7 @@ def _fit(
     sigma_m, sigma_rad = _SIGMA_M, _SIGMA_RAD
     signs = [
         {"distance_scale_ratio": scale, "turn_scale_ratio": turn}
-        for scale, turn in _first_scales(motion, source, grid, eye)
+        for scale, turn in _first_scales(source, grid, eye)
     ]
     begin = [start | scales for start in starts for scales in signs]
     floor = {
@@ -151,13 +150,12 @@ def _fit(
         return np.concatenate(rows)
 
     window = np.tile(eye.window, 2 if poses.theta_rad is None else 3)
-    found = estimate(parameters, residual, window, begin, floor)
-    for _ in range(_ROUNDS - 1):
-        dx, dy, dtheta = parts(usual | found.values)
-        sigma_m = max(_spread(np.concatenate((dx, dy))), _LEAST_SIGMA_M)
-        if dtheta is not None:
-            sigma_rad = max(_spread(dtheta), _LEAST_SIGMA_RAD)
-        found = estimate(parameters, residual, window, [found.values], floor)
+    values = first_values(parameters, residual, begin)
+    dx, dy, dtheta = parts(usual | values)
+    sigma_m = max(_spread(np.concatenate((dx, dy))), _LEAST_SIGMA_M)
+    if dtheta is not None:
+        sigma_rad = max(_spread(dtheta), _LEAST_SIGMA_RAD)
+    found = estimate(parameters, residual, window, [values], floor)
     point = usual | found.values
     track = motion(source, grid, point)
     return MotionFit(kind, found, track, mount_of(point), sigma_m, sigma_rad)
@@ -173,38 +171,28 @@ def _spread(values: Array) -> float:
     return 1.4826 * float(np.median(np.abs(values - np.median(values))))
 
 
-def _first_scales(
-    motion: Motion, source: Pair2, grid: Grid, eye: Eye
-) -> list[tuple[float, float]]:
+def _first_scales(source: Pair2, grid: Grid, eye: Eye) -> list[tuple[float, float]]:
     """Return scales to begin with: 1, and those of the whole turn and way in each window.
 
     So that a log in another unit, or with another sign, is still found and said.
     """
     turn = 1.0
-    unit = Pair2Like(source, grid)
+    driven, turned = (
+        np.concatenate(([0.0], np.cumsum(held_means(source.t_s, part, grid.edges_s)) * grid.cell_s))
+        for part in (source.first, source.second)
+    )
     if eye.theta_rad is not None:
         made = _over_windows(eye, eye.theta_rad)
-        asked = _over_windows(eye, np.interp(eye.t_s, grid.edges_s, unit.turned))
+        asked = _over_windows(eye, np.interp(eye.t_s, grid.edges_s, turned))
         if float(asked @ asked) > 1e-9:
             turn = float(made @ asked) / float(asked @ asked)
     chords = np.hypot(_over_windows(eye, eye.x_m), _over_windows(eye, eye.y_m))
-    ways = np.abs(_over_windows(eye, np.interp(eye.t_s, grid.edges_s, unit.driven)))
+    ways = np.abs(_over_windows(eye, np.interp(eye.t_s, grid.edges_s, driven)))
     way = float(chords.sum() / ways.sum()) if ways.sum() > 1e-9 else 1.0
-    del motion
     turn = turn if 0.01 < abs(turn) < 50.0 else 1.0
     way = min(max(way, 0.02), 50.0)
     found = [(1.0, 1.0), (way, turn), (-way, turn), (1.0, turn)]
     return list(dict.fromkeys(found))
-
-
-class Pair2Like:
-    """Way and turn asked, summed over the grid."""
-
-    def __init__(self, source: Pair2, grid: Grid) -> None:
-        means = [held_means(source.t_s, part, grid.edges_s) for part in (source.first, source.second)]
-        self.driven, self.turned = (
-            np.concatenate(([0.0], np.cumsum(part) * grid.cell_s)) for part in means
-        )
 
 
 def _over_windows(eye: Eye, values: Array) -> Array:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hil.study.log_fit.estimate import Estimate, Found, Parameter, estimate
+from hil.study.log_fit.estimate import Estimate, Found, Parameter, estimate, first_values
 from hil.study.log_fit.model import CELL_S, Grid, dead_zone, held_means, lagged
 
 if TYPE_CHECKING:
@@ -143,10 +143,10 @@ def _fit(
         ])  # fmt: skip
 
     groups = np.tile(window[at], 2)
-    found = estimate(parameters, residual, groups, starts, floor)
-    rest = residual(found.values) * sigma
+    values = first_values(parameters, residual, starts)
+    rest = residual(values) * sigma
     sigma = max(1.4826 * float(np.median(np.abs(rest))), _LEAST_SIGMA_RAD_S)
-    return estimate(parameters, residual, groups, [found.values], floor)
+    return estimate(parameters, residual, groups, [values], floor)
 
 
 def motor_values(found: Found, robot: RobotConfig) -> list[Estimate]:
