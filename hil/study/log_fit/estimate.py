@@ -227,6 +227,8 @@ def _search(
     )  # fmt: skip
     rest = of(found.x)
     weight = (1.0 + (rest / _LOSS_AT) ** 2) ** -0.25
+    # Bounds are never quite reached by the search.
+    found.x = np.where(found.x - low < 1e-6 * (high - low), low, found.x)
     return at(found.x), slopes(found.x, both_ways=True) * weight[:, None], rest * weight
 
 

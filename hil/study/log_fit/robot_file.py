@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from hil.config.load import load_robot
 from hil.core.errors import BadInput
 from hil.record.manifest import replace_file
+from hil.study.log_fit.fit import USUAL, twin_values
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -99,8 +100,6 @@ def _line(key: str, item: Estimate) -> str:
 
 
 def _log_fit(fit: LogFit) -> list[str]:
-    from hil.study.log_fit.fit import twin_values  # noqa: PLC0415 - that module writes no file
-
     estimates = [
         (f"{layer}.{item.name}", item)
         for layer, found in fit.layers.items()
@@ -114,7 +113,8 @@ def _log_fit(fit: LogFit) -> list[str]:
     told = {item.name: item for item in fit.body.found.estimates} if fit.body else {}
     for name, value in twin_values(fit).items():
         item = told.get(name)
-        said = item.meaning if item is not None and item.told else "not told, the usual value"
+        usual = "not told, the usual value" if value == USUAL[name] else "a guess: not told well"
+        said = item.meaning if item is not None and item.told else usual
         lines.append(f"{name} = {value:.9g}  # {said}")
     lines += ["", "[log_fit.told]  # value and 95 % interval"]
     lines += [

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     Places = NDArray[np.intp]
 
 WINDOW_S = 2.0
-SHORTEST_S = 1.0
+SHORTEST_S = 0.5
 _LEAST_POSES = 6
 _FITTED_SHARE = 0.7
 _MOVED_M, _MOVED_RAD = 0.01, 0.03
@@ -35,13 +35,13 @@ class Windows:
     length_s: float
 
 
-def cut(poses: Poses, avoid: Sequence[tuple[float, float]], active: Array) -> Windows:
+def cut(poses: Poses, avoid: Sequence[tuple[float, float]], active: NDArray[np.bool_]) -> Windows:
     """Return windows in which something happens, none across a hole in the poses or over `avoid`.
 
     `active` says at each pose whether the robot is being told to move. The last third by number is
     held out.
     """
-    length_s = _length(poses)
+    length_s = _length(poses, active)
     holes = [
         (float(poses.t_s[k]), float(poses.t_s[k + 1]))
         for k in np.flatnonzero(np.diff(poses.t_s) > _hole_s(poses))
@@ -66,10 +66,11 @@ def cut(poses: Poses, avoid: Sequence[tuple[float, float]], active: Array) -> Wi
     return Windows(tuple(found[:fitted]), tuple(found[fitted:]), length_s)
 
 
-def _length(poses: Poses) -> float:
-    """Return 2 s, or less for a short log, so that there are some ten windows."""
-    whole_s = float(poses.t_s[-1] - poses.t_s[0])
-    return max(min(WINDOW_S, whole_s / 14.0), SHORTEST_S)
+def _length(poses: Poses, active: NDArray[np.bool_]) -> float:
+    """Return 2 s, or less where the robot is told to move for a short time, for some 14 windows."""
+    steps_s = np.minimum(np.diff(poses.t_s), _hole_s(poses))
+    told_s = float(steps_s[active[1:]].sum()) or float(steps_s.sum())
+    return max(min(WINDOW_S, told_s / 14.0), SHORTEST_S)
 
 
 def _hole_s(poses: Poses) -> float:
