@@ -35,12 +35,12 @@ MANOEUVRES = {
     "wheel_lag_s": "steps of wheel speed from rest, 1 s each, both sides",
     "wheel_dead_time_s": "steps of wheel speed from rest, 1 s each, both sides",
     "wheel_dead_zone_rad_s": _RAMP,
-    "motor_gain_rad_s_v": "`hil bringup`, top speed step, or full voltage on the floor for 1 s",
-    "motor_dead_v": "`hil bringup`, dead zone step (a ramp of duty), with PWM logged",
-    "motor_turn_dead_v": "turn on the spot with a slow ramp of duty, PWM logged",
-    "motor_forward_lag_s": "steps of duty from rest, straight, 1 s each, PWM logged at 50 Hz or more",
-    "motor_turn_lag_s": "steps of duty from rest, on the spot, 1 s each, PWM logged at 50 Hz or more",
-    "motor_time_offset_s": "steps of duty from rest, PWM and wheel speeds on one clock",
+    "motor_constant_ratio": "`hil bringup`, top speed step, or full voltage on the floor for 1 s",
+    "motor_friction_ratio": "a slow ramp of duty from 0 until it drives, or `hil bringup`, dead zone",
+    "floor_friction_ratio": "turn on the spot at several duties, PWM and wheel speeds logged",
+    "mass_ratio": "steps of duty from rest, straight, 1 s each, PWM and wheel speeds at 50 Hz",
+    "inertia_ratio": "steps of duty from rest, on the spot, 1 s each, PWM and wheel speeds at 50 Hz",
+    "wheel_speed_delay_s": "steps of duty from rest, PWM and wheel speeds on one clock",
 }  # fmt: skip
 
 

@@ -5,7 +5,7 @@ Layers, each fitted where the log has what it needs:
     body      commands of the body -> poses: the twin (scales, lags, dead time, dead zones, veer, mount)
     odometry  wheel speeds -> poses: wheel radius, track, delay of the poses
     wheels    wheel commands -> wheel speeds: scales, lag, dead time, dead zone
-    motors    motor voltages -> wheel speeds: motor constants, dead voltage, mass, inertia
+    motors    motor voltages -> wheel speeds: motor constants, friction, mass, inertia (the plant itself)
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from hil.study.log_fit.model import Grid, Track, body_track, grid_over, odometry
 from hil.study.log_fit.motion import MotionFit, fit_body, fit_odometry, odd_signs
 from hil.study.log_fit.page import Page
 from hil.study.log_fit.signals import LogSignals, Pair2, body_of, held, signals_of
-from hil.study.log_fit.wheels import fit_motors, fit_wheels, motor_values
+from hil.study.log_fit.motors import fit_motors, motor_values
+from hil.study.log_fit.wheels import fit_wheels
 from hil.study.log_fit.windows import Mount, Windows, cut
 
 if TYPE_CHECKING:
@@ -163,14 +164,16 @@ def fit_log(log: Path, mapping: Path | None, robot: RobotConfig) -> LogFit:
     wheels = motors = None
     if signals.wheels is not None and signals.wheel_command is not None:
         wheels = fit_wheels(signals.wheel_command, signals.wheels, grid, signals.holes)
+    values, fitted = _geometry(odometry, robot)
     if signals.wheels is not None and signals.voltage is not None:
-        motors = fit_motors(signals.voltage, signals.wheels, grid, signals.holes)
+        motors = fit_motors(signals.voltage, signals.wheels, fitted, signals.holes)
     if body is None and odometry is None and wheels is None and motors is None:
         raise BadInput(
             f"{log}: has {', '.join(signals.has())} over {signals.duration_s:.1f} s, but the robot "
             f"moves in too few windows ({LEAST_WINDOWS} are needed): log some 30 s of driving"
         )
-    values = _robot_values(odometry, motors, robot)
+    if motors is not None:
+        values += motor_values(motors, fitted)
     told = foretellers(signals, grid, body, odometry, turned)
     judged = (
         scores(signals.poses, windows.held_out, told, grid)
@@ -248,10 +251,10 @@ def foretellers(
     return found
 
 
-def _robot_values(
-    odometry: MotionFit | None, motors: Found | None, robot: RobotConfig
-) -> list[Estimate]:
-    """Return the values of the robot file that are told."""
+def _geometry(
+    odometry: MotionFit | None, robot: RobotConfig
+) -> tuple[list[Estimate], RobotConfig]:
+    """Return wheel radius and track as far as they are told, and the robot with them."""
     found: list[Estimate] = []
     fitted = robot
     if odometry is not None:
@@ -270,9 +273,7 @@ def _robot_values(
             found.append(Estimate("track_m", "m", "effective: of turns made, with what wheels scrub",
                                   track, track - half, track + half, told=True))  # fmt: skip
             fitted = fitted.model_copy(update={"track_m": track})
-    if motors is not None:
-        found += [item for item in motor_values(motors, fitted) if item.told]
-    return found
+    return found, fitted
 
 
 def twin_values(fit: LogFit) -> dict[str, float]:
