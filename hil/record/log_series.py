@@ -187,16 +187,16 @@ def _of_tlog(path: Path, settings: LogMapping, mapped: bool) -> tuple[Series, li
 def _of_record(path: Path) -> LogSeries:
     run = read_run(path)
     t_s = run.samples["t_s"]
-    series = {
-        name: _known(t_s, run.samples[name])
-        for name in SAMPLE_NAMES
-        if name in _KNOWN
-    }
+    series = {name: _known(t_s, run.samples[name]) for name in SAMPLE_NAMES if name in _KNOWN}
     notes = list(run.problems)
     imported = not (path / layout.TAPE).is_file() or not (path / layout.TAPE).stat().st_size
     if run.frames and run.frames["t_exposure_s"].size:
         seen = run.frames["seen"] == 1.0
-        for name, column in (("x_m", "est_x_m"), ("y_m", "est_y_m"), ("theta_rad", "est_theta_rad")):
+        for name, column in (
+            ("x_m", "est_x_m"),
+            ("y_m", "est_y_m"),
+            ("theta_rad", "est_theta_rad"),
+        ):
             series[column] = _known(run.frames["t_exposure_s"][seen], run.frames[name][seen])
         notes.append("poses as the camera saw them, at the middle of each exposure")
     elif not imported:

@@ -18,7 +18,9 @@ from hil.study.log_fit.fit import fit_log
 from tests.log_fit.twins import Answer, drive, write_csv
 
 
-def measure(twins: int, first: int = 100, duration_s: float = 60.0) -> dict[str, list[tuple[bool, float]]]:
+def measure(
+    twins: int, first: int = 100, duration_s: float = 60.0
+) -> dict[str, list[tuple[bool, float]]]:
     """Return, by parameter, (inside, half width) of every twin whose log told it."""
     found: dict[str, list[tuple[bool, float]]] = defaultdict(list)
     robot = load_robot("thesis-4wd")

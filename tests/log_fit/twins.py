@@ -99,7 +99,9 @@ def drive(
     zones = (answer.forward_dead_zone_m_s, answer.turn_dead_zone_rad_s)
     for k in range(count):
         rows[k] = x, y, theta, forward, turn
-        u, w = (math.copysign(max(abs(v) - z, 0.0), v) for v, z in zip(asked[:, k], zones, strict=True))
+        u, w = (
+            math.copysign(max(abs(v) - z, 0.0), v) for v, z in zip(asked[:, k], zones, strict=True)
+        )
         forward += STEP_S * (answer.distance_scale_ratio * u - forward) / answer.forward_lag_s
         turn += STEP_S * (answer.turn_scale_ratio * w - turn) / answer.turn_lag_s
         loss += -STEP_S * loss / 0.5 + push[0, k]
@@ -147,9 +149,7 @@ def write_table(path: Path, parts: list[tuple[str, Array]]) -> Path:
     return path
 
 
-def motor_log(
-    path: Path, changes: dict[str, Any], seed: int = 1, duration_s: float = 60.0
-) -> Path:
+def motor_log(path: Path, changes: dict[str, Any], seed: int = 1, duration_s: float = 60.0) -> Path:
     """Drive the robot's plant by steps of duty; write duty, battery, wheel speeds and poses at 50 Hz.
 
     `changes` are true values of the robot's file; a dotted key reaches into a table.

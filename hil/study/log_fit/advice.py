@@ -14,7 +14,9 @@ _STRAIGHT = "drive straight, 1 m or more, forward and back, at two speeds, with 
 _SPIN = "turn on the spot, two whole turns to each side, at two rates, with poses logged"
 _STEPS = "eight steps of forward speed from rest and back to 0, 1.5 s each, commands logged as sent"
 _TURN_STEPS = "eight steps of turn rate from rest and back to 0, 1.5 s each, to both sides"
-_RAMP = "a slow ramp of the command from 0 until it moves and back, or `hil bringup`, dead zone step"
+_RAMP = (
+    "a slow ramp of the command from 0 until it moves and back, or `hil bringup`, dead zone step"
+)
 _BOTH = "an eight: arcs to both sides at a speed and rate that are both well above the dead zone"
 
 MANOEUVRES = {

@@ -25,9 +25,9 @@ from hil.study.log_fit.estimate import Estimate, Found
 from hil.study.log_fit.judge import Score, scores
 from hil.study.log_fit.model import Grid, Track, body_track, grid_over, odometry_track
 from hil.study.log_fit.motion import MotionFit, fit_body, fit_odometry, odd_signs
+from hil.study.log_fit.motors import fit_motors, motor_values
 from hil.study.log_fit.page import Page
 from hil.study.log_fit.signals import LogSignals, Pair2, body_of, held, signals_of
-from hil.study.log_fit.motors import fit_motors, motor_values
 from hil.study.log_fit.wheels import fit_wheels
 from hil.study.log_fit.windows import Mount, Windows, cut
 
@@ -103,7 +103,9 @@ class LogFit:
 
     def text(self) -> str:
         """Return the answer for a person."""
-        lines = [f"{self.log.name}: {', '.join(self.signals.has())}; {self.signals.duration_s:.1f} s"]
+        lines = [
+            f"{self.log.name}: {', '.join(self.signals.has())}; {self.signals.duration_s:.1f} s"
+        ]
         for name, found in self.layers.items():
             lines.append(f"{_LAYER_TITLES[name]} ({found.windows} windows fitted):")
             lines += [f"  {item.text()}" for item in found.estimates]
@@ -251,9 +253,7 @@ def foretellers(
     return found
 
 
-def _geometry(
-    odometry: MotionFit | None, robot: RobotConfig
-) -> tuple[list[Estimate], RobotConfig]:
+def _geometry(odometry: MotionFit | None, robot: RobotConfig) -> tuple[list[Estimate], RobotConfig]:
     """Return wheel radius and track as far as they are told, and the robot with them."""
     found: list[Estimate] = []
     fitted = robot
@@ -268,7 +268,9 @@ def _geometry(
             fitted = fitted.model_copy(update={"wheel_radius_m": radius * way.value})
         if way.told and turn.told and way.low > 0.0 and turn.low > 0.0:
             track = robot.track_m * way.value / turn.value
-            share = math.hypot((way.high - way.low) / way.value, (turn.high - turn.low) / turn.value)
+            share = math.hypot(
+                (way.high - way.low) / way.value, (turn.high - turn.low) / turn.value
+            )
             half = 0.5 * track * share
             found.append(Estimate("track_m", "m", "effective: of turns made, with what wheels scrub",
                                   track, track - half, track + half, told=True))  # fmt: skip

@@ -36,12 +36,12 @@ def grid_over(end_s: float) -> Grid:
     """Return cells of 10 ms, or wider ones for a log of hours, from 0 to beyond `end_s`."""
     cell_s = max(CELL_S, end_s / _MOST_CELLS)
     count = int(end_s / cell_s) + 2
-    return Grid(cell_s * np.arange(count + 1), cell_s)
+    return Grid(np.asarray(cell_s * np.arange(count + 1), dtype=np.float64), cell_s)
 
 
 def dead_zone(values: Array, width: float) -> Array:
     """Return values drawn towards zero by `width`, zero within it."""
-    return np.sign(values) * np.maximum(np.abs(values) - width, 0.0)
+    return np.asarray(np.sign(values) * np.maximum(np.abs(values) - width, 0.0))
 
 
 def held_means(t_s: Array, values: Array, edges_s: Array) -> Array:

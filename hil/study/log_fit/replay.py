@@ -7,8 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hil.core.errors import BadInput
+from hil.record import layout
 from hil.record.log_series import read_series
-from hil.study.log_fit.fit import LEAST_WINDOWS, USUAL, foretellers, windows_of
+from hil.record.manifest import read_manifest
+from hil.record.source import recorded_scenario
+from hil.study.log_fit.fit import LEAST_WINDOWS, USUAL, fit_log, foretellers, windows_of
 from hil.study.log_fit.judge import Score, scores
 from hil.study.log_fit.model import Grid, Track, body_track, grid_over
 from hil.study.log_fit.motion import mount_of
@@ -84,7 +87,9 @@ def replay_log(log: Path, mapping: Path | None, robot: RobotConfig) -> LogReplay
         )
     windows = windows_of(signals, [])
     if windows is None:
-        raise BadInput(f"{log}: too short or too still to be replayed: {LEAST_WINDOWS} windows needed")
+        raise BadInput(
+            f"{log}: too short or too still to be replayed: {LEAST_WINDOWS} windows needed"
+        )
     windows = Windows((), (*windows.fitted, *windows.held_out), windows.length_s)
     grid = grid_over(signals.duration_s)
     turned = body_of(signals.wheels, robot) if signals.wheels is not None else None
@@ -94,3 +99,27 @@ def replay_log(log: Path, mapping: Path | None, robot: RobotConfig) -> LogReplay
         log, robot, robot.log_fit.log, signals, grid, windows, told,
         scores(signals.poses, windows.held_out, told, grid),
     )  # fmt: skip
+
+
+def is_imported(run: Path) -> bool:
+    """Say whether a record holds no inputs to replay, as one made of another program's log."""
+    tape = run / layout.TAPE
+    return (run / layout.SAMPLES).is_file() and (not tape.is_file() or tape.stat().st_size == 0)
+
+
+def replay_imported(run: Path) -> tuple[LogReplay, dict[str, Any]]:
+    """Fit a twin to an imported record and replay the part held out; raises BadInput.
+
+    Returns the replay and the fit as a JSON tree.
+    """
+    robot = recorded_scenario(read_manifest(run), run).robot
+    fit = fit_log(run, None, robot)
+    if fit.body is None or fit.windows is None:
+        raise BadInput(
+            f"{run}: has {', '.join(fit.signals.has())}; a twin needs commands and poses while it moves"
+        )
+    answer = LogReplay(
+        run, robot, f"the first {len(fit.windows.fitted)} windows of {run.name}", fit.signals,
+        fit.grid, fit.windows, fit.foretellers, fit.scores,
+    )  # fmt: skip
+    return answer, fit.to_json()

@@ -70,7 +70,8 @@ def write_robot_file(file: Path, believed: str, fit: LogFit) -> Path | None:
 
 def _free_name(file: Path) -> Path:
     names = (
-        file.with_name(f"{file.stem}.before{'' if k == 1 else f'-{k}'}.toml") for k in range(1, 1000)
+        file.with_name(f"{file.stem}.before{'' if k == 1 else f'-{k}'}.toml")
+        for k in range(1, 1000)
     )
     return next(name for name in names if not name.exists())
 
@@ -109,7 +110,10 @@ def _log_fit(fit: LogFit) -> list[str]:
     untold = [name for name, item in estimates if not item.told]
     lines = ["", "[log_fit]", f"log = {_quoted(fit.log.name)}", f'sha256 = "{fit.sha256}"',
              "not_told = [", *(f'  "{name}",' for name in untold), "]"]  # fmt: skip
-    lines += ["", "[log_fit.twin]  # commands of the body to motion; `hil fit LOG --replay` drives it"]
+    lines += [
+        "",
+        "[log_fit.twin]  # commands of the body to motion; `hil fit LOG --replay` drives it",
+    ]
     told = {item.name: item for item in fit.body.found.estimates} if fit.body else {}
     for name, value in twin_values(fit).items():
         item = told.get(name)

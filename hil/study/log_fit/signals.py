@@ -237,7 +237,6 @@ def _strays(values: Array, least: float) -> NDArray[np.bool_]:
     width = 2 * _HAMPEL_HALF + 1
     padded = np.pad(values, _HAMPEL_HALF, mode="edge")
     around = np.lib.stride_tricks.sliding_window_view(padded, width)
-    # A straight line through the median's neighbours would do the same: motion is smooth over seven.
     middle = np.median(around, axis=1)
     off = np.abs(values - middle)
     usual = 1.4826 * float(np.median(off))
@@ -246,7 +245,8 @@ def _strays(values: Array, least: float) -> NDArray[np.bool_]:
         np.lib.stride_tricks.sliding_window_view(np.pad(steps, _HAMPEL_HALF, mode="edge"), width),
         axis=1,
     )
-    return off > np.maximum(np.maximum(_HAMPEL_LIMIT * usual, least), 2.0 * _HAMPEL_HALF * pace)
+    limit = np.maximum(np.maximum(_HAMPEL_LIMIT * usual, least), 2.0 * _HAMPEL_HALF * pace)
+    return np.asarray(off > limit)
 
 
 def _check_units(body: Pair2 | None, poses: Poses | None, where: str) -> None:
@@ -286,9 +286,7 @@ def _holes(command: Pair2 | None, notes: list[str]) -> tuple[tuple[float, float]
     if np.quantile(gaps, 0.95) > 3.0 * period_s:
         return ()
     limit_s = max(_HOLE_PERIODS * period_s, _LEAST_HOLE_S)
-    holes = [
-        (float(a), float(b)) for a, b in itertools.pairwise(command.t_s) if b - a > limit_s
-    ]
+    holes = [(float(a), float(b)) for a, b in itertools.pairwise(command.t_s) if b - a > limit_s]
     if holes:
         notes.append(
             f"{len(holes)} holes in the commands, {sum(b - a for a, b in holes):.3g} s together: what "
