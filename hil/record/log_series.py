@@ -16,7 +16,6 @@ import numpy as np
 
 from hil.config.load import build
 from hil.core.errors import BadInput
-from hil.record import layout
 from hil.record.log_csv import _Cells, _chosen, _read_table
 from hil.record.log_mapping import STANDARD, LogMapping, Source
 from hil.record.log_signals import counter_hint, fall_text, in_order, scaled
@@ -189,7 +188,7 @@ def _of_record(path: Path) -> LogSeries:
     t_s = run.samples["t_s"]
     series = {name: _known(t_s, run.samples[name]) for name in SAMPLE_NAMES if name in _KNOWN}
     notes = list(run.problems)
-    imported = not (path / layout.TAPE).is_file() or not (path / layout.TAPE).stat().st_size
+    imported = run.manifest.target.startswith("import:")
     if run.frames and run.frames["t_exposure_s"].size:
         seen = run.frames["seen"] == 1.0
         for name, column in (

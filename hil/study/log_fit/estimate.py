@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 CONFIDENCE = 0.95
 _LOSS_AT = 2.0  # residuals beyond two sigma count less
 _MOST_STEPS = 25
+_POLISHES = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,8 +229,24 @@ def _search(
     rest = of(found.x)
     weight = (1.0 + (rest / _LOSS_AT) ** 2) ** -0.25
     # Bounds are never quite reached by the search.
-    found.x = np.where(found.x - low < 1e-6 * (high - low), low, found.x)
-    return at(found.x), slopes(found.x, both_ways=True) * weight[:, None], rest * weight
+    point = np.where(found.x - low < 1e-6 * (high - low), low, found.x)
+    rest = of(point)
+    jacobian = slopes(point, both_ways=True) * _weighted(rest)[:, None]
+    # A few steps with better slopes: where it ends must not depend on how it came there.
+    for _ in range(_POLISHES):
+        step = np.linalg.lstsq(jacobian, -rest * _weighted(rest), rcond=1e-9)[0]
+        after = np.clip(point + step, low, high)
+        if (np.abs(after - point) < 1e-3 * steps).all() or _cost(of(after)) >= _cost(rest):
+            break
+        point = after
+        rest = of(point)
+        jacobian = slopes(point, both_ways=True) * _weighted(rest)[:, None]
+    return at(point), jacobian, rest * _weighted(rest)
+
+
+def _weighted(rest: Array) -> Array:
+    """Return the square roots of the weights that the loss gives."""
+    return np.asarray((1.0 + (rest / _LOSS_AT) ** 2) ** -0.25)
 
 
 def _reach(jacobian: Array, rest: Array, window: NDArray[np.intp]) -> Array:
@@ -243,10 +260,13 @@ def _reach(jacobian: Array, rest: Array, window: NDArray[np.intp]) -> Array:
     unit = np.where(silent, 1.0, scale)
     scaled = jacobian / unit
     whole = scaled.T @ scaled
-    moves = []
+    inverse = np.linalg.inv(whole + 1e-12 * np.eye(size))
+    moves, shares = [], []
     for name in names:
         rows = window == name
-        left = whole - scaled[rows].T @ scaled[rows]
+        own = scaled[rows].T @ scaled[rows]
+        shares.append(np.diag(inverse @ own @ inverse) / np.diag(inverse))
+        left = whole - own
         # Nothing left without this window: the ridge makes its move huge, as it should be.
         left = left + 1e-9 * np.eye(size)
         moves.append(np.linalg.solve(left, scaled[rows].T @ rest[rows]))
@@ -255,8 +275,10 @@ def _reach(jacobian: Array, rest: Array, window: NDArray[np.intp]) -> Array:
     variance = (count - 1.0) / count * ((spread - spread.mean(axis=0)) ** 2).sum(axis=0)
     # Noise alone: a log that happens to agree with itself is not better known than its noise says.
     noise = float(rest @ rest) / max(rest.size - size - 3 * count, 1)
-    plain = noise * np.diag(np.linalg.inv(whole + 1e-12 * np.eye(size)))
-    factor = float(student.ppf(0.5 + CONFIDENCE / 2.0, count - 1))
+    plain = noise * np.diag(inverse)
+    # Windows tell unequally much: as many count as would, told equally, make the same sum of squares.
+    equal = 1.0 / np.maximum((np.array(shares) ** 2).sum(axis=0), 1.0 / count)
+    factor = student.ppf(0.5 + CONFIDENCE / 2.0, np.maximum(equal - 1.0, 1.0))
     reach = factor * np.sqrt(np.maximum(variance, plain)) / unit
     return np.asarray(np.where(silent, math.inf, reach))
 

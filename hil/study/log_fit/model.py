@@ -48,7 +48,7 @@ def held_means(t_s: Array, values: Array, edges_s: Array) -> Array:
     """Return the mean over each cell of a signal that holds its value until the next; 0 before."""
     whole = np.concatenate(([0.0], np.cumsum(values[:-1] * np.diff(t_s))))
     after = np.maximum(edges_s - t_s[-1], 0.0) * values[-1]
-    return np.diff(np.interp(edges_s, t_s, whole) + after) / np.diff(edges_s)
+    return np.asarray(np.diff(np.interp(edges_s, t_s, whole) + after) / np.diff(edges_s))
 
 
 def joined_means(t_s: Array, values: Array, edges_s: Array) -> Array:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hil.core.errors import BadInput
-from hil.record import layout
 from hil.record.log_series import read_series
 from hil.record.manifest import read_manifest
 from hil.record.source import recorded_scenario
@@ -102,9 +101,8 @@ def replay_log(log: Path, mapping: Path | None, robot: RobotConfig) -> LogReplay
 
 
 def is_imported(run: Path) -> bool:
-    """Say whether a record holds no inputs to replay, as one made of another program's log."""
-    tape = run / layout.TAPE
-    return (run / layout.SAMPLES).is_file() and (not tape.is_file() or tape.stat().st_size == 0)
+    """Say whether a record was made of another program's log, and so holds no inputs to replay."""
+    return read_manifest(run).target.startswith("import:")
 
 
 def replay_imported(run: Path) -> tuple[LogReplay, dict[str, Any]]:

@@ -122,7 +122,10 @@ class Eye:
     def residuals(
         self, track: Track, grid: Grid, mount: Mount, sigma_m: float, sigma_rad: float
     ) -> tuple[Array, Array, Array | None]:
-        """Return model - seen in x, y (m) and heading (rad), each window laid on at its best."""
+        """Return model - seen along, across (m) and in heading (rad), each window laid on at its best.
+
+        Along and across are of the model's heading: how the world lies must not matter.
+        """
         x, y, theta = self.modelled(track, grid, mount)
         return self.laid_on(x, y, theta, mount.turned_rad, sigma_m, sigma_rad)
 
@@ -137,7 +140,7 @@ class Eye:
             along = self._sum(px * mx + py * my)
             phi = np.arctan2(across, along)[self.window]
             cos, sin = np.cos(phi), np.sin(phi)
-            return cos * px - sin * py - mx, sin * px + cos * py - my, None
+            return *_along(cos * px - sin * py - mx, sin * px + cos * py - my, theta + phi), None
         off = self.theta_rad - turned_rad - theta
         phi = self._mean(off)
         for _ in range(2):
@@ -147,10 +150,16 @@ class Eye:
             stiff = self._sum(qx * mx + qy * my) / sigma_m**2 + self.sizes / sigma_rad**2
             phi = phi + (pull / np.maximum(stiff, 1e-9))[self.window]
         cos, sin = np.cos(phi), np.sin(phi)
-        return cos * px - sin * py - mx, sin * px + cos * py - my, phi - off
+        dx, dy = cos * px - sin * py - mx, sin * px + cos * py - my
+        return *_along(dx, dy, theta + phi), phi - off
 
     def _sum(self, values: Array) -> Array:
         return np.asarray(np.add.reduceat(values, self.first))
 
     def _mean(self, values: Array) -> Array:
         return np.asarray((self._sum(values) / self.sizes)[self.window])
+
+
+def _along(dx: Array, dy: Array, heading: Array) -> tuple[Array, Array]:
+    cos, sin = np.cos(heading), np.sin(heading)
+    return cos * dx + sin * dy, cos * dy - sin * dx
