@@ -226,8 +226,6 @@ def _search(
         x_scale=np.array([max(item.known_to, item.step) for item in free]), max_nfev=_MOST_STEPS,
         ftol=1e-7, xtol=1e-6, gtol=1e-6,
     )  # fmt: skip
-    rest = of(found.x)
-    weight = (1.0 + (rest / _LOSS_AT) ** 2) ** -0.25
     # Bounds are never quite reached by the search.
     point = np.where(found.x - low < 1e-6 * (high - low), low, found.x)
     rest = of(point)

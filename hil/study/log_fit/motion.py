@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -135,7 +135,13 @@ def _fit(
         "forward_dead_zone_m_s": 2e-4, "turn_dead_zone_rad_s": 5e-4,
     }  # fmt: skip
     if poses.theta_rad is None:
-        parameters = tuple(item for item in parameters if item.name != "heading_offset_rad")
+        # Backwards and turned round looks the same without a heading: forward is taken.
+        parameters = tuple(
+            replace(item, low=0.0) if item.name == "distance_scale_ratio" else item
+            for item in parameters
+            if item.name != "heading_offset_rad"
+        )
+        begin = [start for start in begin if start["distance_scale_ratio"] > 0.0]
     usual = {"heading_offset_rad": 0.0}
 
     def parts(point: dict[str, float]) -> tuple[Array, Array, Array | None]:

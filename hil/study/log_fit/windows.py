@@ -70,7 +70,9 @@ def _length(poses: Poses, active: NDArray[np.bool_]) -> float:
     """Return 2 s, or less where the robot is told to move for a short time, for some 14 windows."""
     steps_s = np.minimum(np.diff(poses.t_s), _hole_s(poses))
     told_s = float(steps_s[active[1:]].sum()) or float(steps_s.sum())
-    return max(min(WINDOW_S, told_s / 14.0), SHORTEST_S)
+    # Without headings the direction of each window is free too: longer ones hold it better.
+    factor = 1.0 if poses.theta_rad is not None else 2.0
+    return max(min(factor * WINDOW_S, told_s / 14.0), SHORTEST_S)
 
 
 def _hole_s(poses: Poses) -> float:
