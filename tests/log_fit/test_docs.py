@@ -40,7 +40,13 @@ def write_logs(mapping: str) -> None:
 def test_the_page_from_top_to_bottom(hil: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     """The mapping is one, each command ends well, the robot file tells the distance scale."""
     write_logs(next(text for kind, text in BLOCKS if kind == "toml"))
-    ran = []
+    ran: list[str] = []
+    measured: list[int] = []
+
+    def measure(twins: int) -> dict[str, list[tuple[bool, float]]]:
+        measured.append(twins)
+        return {"veer_rad_m": [(True, 1.0)]}
+
     for kind, text in BLOCKS:
         for line in text.splitlines() if kind == "console" else ():
             words = shlex.split(line)
@@ -49,14 +55,11 @@ def test_the_page_from_top_to_bottom(hil: Command, monkeypatch: pytest.MonkeyPat
                 assert status == 0, f"{line}: {err}"
             else:
                 assert words[:3] == ["python", "-m", "tests.log_fit.coverage"], line
-                measured = []
-                monkeypatch.setattr(
-                    coverage_script, "measure", lambda n: measured.append(n) or {"k": [(True, 1.0)]}
-                )
+                monkeypatch.setattr(coverage_script, "measure", measure)
                 monkeypatch.setattr("sys.argv", ["coverage", *words[3:]])
                 coverage_script.main()
-                assert measured == [20]
             ran.append(words[0])
     assert ran.count("hil") == 4
+    assert measured == [20]
     assert '"body.distance_scale_ratio"' in Path("my_robot.toml").read_text(encoding="utf-8")
     assert Path("my_robot.html").is_file()

@@ -125,6 +125,7 @@ def estimate(
         values = values | {worst.name: worst.usual}
         free = [item for item in free if item.name != worst.name]
     extra = _from_fixed(parameters, len(free), fixed, residual, values, jacobian)
+    alone = dict(reaches)
     for k, item in enumerate(free):
         reaches[item.name] = math.hypot(reach[k], floor.get(item.name, 0.0), math.sqrt(extra[k]))
     found = []
@@ -132,7 +133,7 @@ def estimate(
         if item.name in fixed:
             found.append(_untold(item, item.usual, fixed[item.name][1]))
         else:
-            found.append(_told(item, values[item.name], reaches[item.name]))
+            found.append(_told(item, values[item.name], reaches[item.name], alone[item.name]))
     return Found(values, tuple(found), int(np.unique(window).size))
 
 
@@ -143,9 +144,11 @@ def first_values(
     return _search(parameters, residual, _best_start(parameters, residual, starts))[0]
 
 
-def _told(item: Parameter, value: float, reach: float) -> Estimate:
+def _told(item: Parameter, value: float, reach: float, alone: float) -> Estimate:
     if not math.isfinite(reach) or reach > _limit(item, value):
         note = f"{value:.4g} +- {reach:.2g}" if math.isfinite(reach) and reach < 1e3 else ""
+        if note and alone <= _limit(item, value):
+            note += f"; +- {alone:.2g} if what else is not told has its usual value"
         return _untold(item, value, note)
     low, high = value - reach, value + reach
     note = ""

@@ -27,6 +27,7 @@ _SIGMA_M, _SIGMA_RAD = 0.005, 0.02
 _LEAST_SIGMA_M, _LEAST_SIGMA_RAD = 1e-4, 1e-4
 # Largest share of a command that a dead zone may be, and how long a robot may take to answer.
 _MOST_ZONE = 0.8
+_STANDS = 0.005  # scales below this are of a robot that stands
 _LONGEST_LAG_S, _LONGEST_DEAD_S = 3.0, 1.5
 # What the cells of 10 ms leave unknown.
 _FLOOR_S, _FLOOR_RATIO = 0.1 * CELL_S, 2e-4
@@ -213,7 +214,9 @@ def odd_signs(found: Found) -> list[str]:
         value = found.values[name]
         if not found.told(name):
             continue
-        if value < 0.0:
+        if abs(value) < _STANDS:
+            said.append(f"{what} does not happen, though it is asked for: wheels off the ground?")
+        elif value < 0.0:
             said.append(f"{what} goes the other way than asked ({value:.3g}): turn the sign of its "
                         "scale in the mapping, or left and right are swapped")  # fmt: skip
         elif not 0.25 < value < 4.0:
