@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hil.core.errors import BadInput
-from hil.core.text import visible
 from hil.record.log_series import read_series
 from hil.study.log_fit.advice import Advice, advise
 from hil.study.log_fit.estimate import Estimate, Found
