@@ -98,9 +98,9 @@ class BringUpConfig(Section):
 class FittedValue(Section):
     """A value that a log tells, with its 95 % interval; the unit stands in its name."""
 
-    value: float
-    low: float
-    high: float
+    value: float = Field(description="what the log tells")
+    low: float = Field(description="lower end of the interval")
+    high: float = Field(description="upper end of the interval")
 
 
 class LogFitConfig(Section):
