@@ -63,7 +63,14 @@ def command(
     from hil.replays.firmware import core, replay_wheels
     from hil.replays.output import claim_folder, write_output
     from hil.replays.what_if import what_if
+    from hil.study.log_fit.replay import is_imported
 
+    if fit and is_imported(run):
+        changed = [f"--{name}" for name, value in (
+            ("outer", outer), ("inner", inner), ("firmware", firmware), ("elf", elf),
+            ("set", overrides), ("recorded-code", recorded_code),
+        ) if value]  # fmt: skip
+        return _replay_imported(run, changed, out, as_json)
     told = read_manifest(run).scenario.get("duration_s")
     duration_s = float(told) if isinstance(told, int | float) else 0.0  # for the bar; replay checks
     through = elf_firmware() if elf else core()
@@ -104,6 +111,36 @@ def _status(report: ReplayReport) -> int:
         return 0 if report.identical else 1
     stopped = report.ending.outcome == "fault" and report.ticks_replayed < report.ticks_recorded
     return 3 if stopped and not report.cut_off else 0
+
+
+def _replay_imported(run: Path, changed: list[str], out: Path | None, as_json: bool) -> int:
+    """Send an imported record's commands through a twin fitted to its first part."""
+    import json
+
+    from hil.core.errors import BadInput
+    from hil.core.files import replace_file
+    from hil.replays.output import claim_folder
+    from hil.study.log_fit.page import write_page
+    from hil.study.log_fit.replay import replay_imported
+
+    if changed:
+        raise BadInput(
+            f"{', '.join(changed)}: {run} is an imported log, which has neither frames nor bytes of the "
+            "board: --fit alone fits a twin to its commands and replays them"
+        )
+    if out is not None:
+        claim_folder(out)
+    answer, fitted = replay_imported(run)
+    document = {"kind": "imported", "fitted_twin": fitted, "held_out": answer.to_json()}
+    if out is not None:
+        text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+        replace_file(out / "replay.json", text.encode() + b"\n")
+        write_page(out / "replay.html", answer.page())
+    if as_json:
+        print_json(document)
+    else:
+        click.echo(answer.text())
+    return 0
 
 
 def print_report(report: ReplayReport) -> None:

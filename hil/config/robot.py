@@ -152,6 +152,24 @@ class DifferentialConfig(VehicleConfig):
     )
 
 
+class FittedValue(Section):
+    """A value that a log tells, with its 95 % interval; the unit stands in its name."""
+
+    value: float = quantity("", "what the log tells")
+    low: float = quantity("", "lower end of the interval")
+    high: float = quantity("", "upper end of the interval")
+
+
+class LogFitConfig(Section):
+    """What `hil fit` found in a log: the answer to commands of the body, as a twin of it needs it."""
+
+    log: str = Field(max_length=300, description="name of the log's file")
+    sha256: str = Field(max_length=64, description="of the log's file")
+    twin: dict[str, float] = Field(description="every parameter of the fitted twin, told or usual")
+    told: dict[str, FittedValue] = Field(description="what the log tells")
+    not_told: tuple[str, ...] = Field((), description="what it does not; the twin has usual values")
+
+
 class RobotConfig(Section):
     """A robot with a left and a right driven side (docs/twin.md)."""
 
@@ -200,6 +218,7 @@ class RobotConfig(Section):
     battery: BatteryConfig
     floor: FloorConfig
     bring_up: BringUpConfig | None = Field(None, description="measured, for people to compare with")
+    log_fit: LogFitConfig | None = Field(None, description="found in a log by hil fit")
 
     @property
     def no_load_rad_s(self) -> float:
