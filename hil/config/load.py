@@ -6,6 +6,7 @@ Every refusal is one BadInput line that names file, key, value with its unit, an
 from __future__ import annotations
 
 import difflib
+import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
@@ -14,7 +15,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from hil.board._firmware import parameter_table
+from hil.board._firmware import ENCODER_COUNTS_1_S, parameter_table
 from hil.config.gains import shipped_gains
 from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
@@ -103,6 +104,20 @@ def check_board(values: Mapping[str, float]) -> None:
                 f"board.{name} = {value:g} {entry.unit}: allowed are {entry.minimum:g} to "
                 f"{entry.maximum:g} {entry.unit}".rstrip()
             )
+
+
+def check_edges(values: Mapping[str, float]) -> None:
+    """Raise BadInput when the encoders may give more counts than the board can count.
+
+    `values` are a board's parameters, whole; the board refuses to arm with such a set too.
+    """
+    counts_1_s = values["ENC_COUNTS"] * values["OVER_W"] / math.tau
+    if counts_1_s > ENCODER_COUNTS_1_S:
+        raise BadInput(
+            f"ENC_COUNTS = {values['ENC_COUNTS']:g} counts/turn at OVER_W = {values['OVER_W']:g} rad/s "
+            f"makes {counts_1_s:.0f} counts/s: the board counts up to {ENCODER_COUNTS_1_S:.0f} counts/s; "
+            "lower OVER_W (and W_MAX), or take an encoder with fewer counts a turn"
+        )
 
 
 def read_tree(name_or_path: str, kind: str) -> Tree:

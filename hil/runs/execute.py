@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import cv2
 
 from hil.analysis.metrics import LinkStats
+from hil.config.load import check_edges
 from hil.control.estimators.geometry import BelievedGeometry
 from hil.control.estimators.making import make_estimator
 from hil.control.laws.hold import HoldAtGoal
@@ -138,11 +139,13 @@ def execute_in_memory(spec: RunSpec, rig: Rig | None = None) -> RunRecord:
 
 
 def board_parameters(scenario: Scenario, inner: str) -> dict[str, float]:
-    """Return every board parameter as this run needs it."""
-    return scenario.board | {
+    """Return every board parameter as this run needs it; raises BadInput where the board cannot count."""
+    parameters = scenario.board | {
         "ENC_COUNTS": float(scenario.robot.encoder_counts_per_turn),
         "LAW": INNER_LAWS[inner],
     }
+    check_edges(parameters)
+    return parameters
 
 
 def make_law(spec: RunSpec) -> OuterLaw:
