@@ -179,9 +179,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
     """Return the parts of a session over `rig`; `law` is another one than a new one of the spec."""
     scenario, control = spec.scenario, spec.scenario.control
     robot = scenario.robot
-    geometry = BelievedGeometry(
-        robot.wheel_radius_m, robot.track_m, robot.d0_m, robot.encoder_counts_per_turn
-    )
+    geometry = BelievedGeometry.of(robot)
     timeline = Timeline(recorder, _unix_us)
     return Parts(
         rig=rig,

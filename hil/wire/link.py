@@ -209,6 +209,7 @@ class BoardLink:
             if sent_s is not None:
                 rest_us = (wire.t_mcu_us - wire.t_setpoint_us) & 0xFFFF_FFFF
                 round_trip_s = t_s - sent_s - rest_us * 1e-6
+        self.clock.report(wire.t_mcu_us, t_s)
         t_board_s = self.clock.to_host_s(wire.t_mcu_us) if self.clock.ready else t_s
         sample = WheelSample(
             t_board_s,
