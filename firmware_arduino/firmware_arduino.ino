@@ -90,5 +90,6 @@ void loop() {
   g_ticks_done = now;
   tick();
   host_port::pump(g_board);
+  board_slack(g_board);
   restart::feed_watchdog();
 }

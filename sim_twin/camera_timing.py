@@ -2,7 +2,9 @@
 
 Frame k is exposed from k periods after the first on, on the camera's own clock. Its time of
 arrival is the middle of the exposure + latency + jitter (Gaussian, within three standard
-deviations); frames keep their order and never arrive before the exposure has ended.
+deviations); frames keep their order and never arrive before the exposure has ended. Where a frame
+may have to wait for the one before it, all are drawn earlier by so much that the median of what
+arrives is the latency configured; the spread is a little below the jitter then.
 """
 
 from __future__ import annotations
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
 
 # A camera's quartz, assumed; slow enough for any estimator, real enough to be noticed.
 CLOCK_PPM = 20.0
+
+_MOST_SIGMAS = 3.0
 
 Span = tuple[float, float]
 
@@ -40,7 +44,7 @@ class Shutter:
         self._rng = rng
         self._period_s = 1.0 / camera.rate_hz
         self._exposure_s = camera.exposure_s
-        self._latency_s = camera.latency_s
+        self._latency_s = camera.latency_s - _median_wait_s(camera)
         self._jitter_s = camera.latency_jitter_s
         self._drop_ratio = camera.drop_ratio
         self._t_first_s = t_first_s + self._period_s * rng.random()
@@ -76,7 +80,42 @@ class Shutter:
         start_s = self._t_first_s + index * self._period_s
         end_s = start_s + self._exposure_s
         middle_s = 0.5 * (start_s + end_s)
-        spread = min(max(self._rng.gauss(0.0, 1.0), -3.0), 3.0)
+        spread = min(max(self._rng.gauss(0.0, 1.0), -_MOST_SIGMAS), _MOST_SIGMAS)
         arrival_s = middle_s + self._latency_s + self._jitter_s * spread
         clock_s = self._clock_start_s + (middle_s - self._t_first_s) * (1.0 + 1e-6 * CLOCK_PPM)
         return Exposure(index, start_s, end_s, clock_s, max(arrival_s, end_s, self._last_arrival_s))
+
+
+def _median_wait_s(camera: CameraConfig) -> float:
+    """Return by how much keeping the order would raise the median delay.
+
+    A frame arrives no later than x after its exposure when its own delay is below x and that of the
+    frame k before it, unless dropped, below x + k periods: the product of these chances is 0.5 at
+    the median.
+    """
+    period_s, jitter_s = 1.0 / camera.rate_hz, camera.latency_jitter_s
+    reach_s = _MOST_SIGMAS * jitter_s
+    if reach_s <= period_s or camera.drop_ratio >= 1.0:
+        return 0.0
+    before = range(1, math.ceil(2.0 * reach_s / period_s) + 1)
+
+    def share_below(x_s: float) -> float:
+        share = _below(x_s / jitter_s)
+        for k in before:
+            share *= camera.drop_ratio + (1.0 - camera.drop_ratio) * _below(
+                (x_s + k * period_s) / jitter_s
+            )
+        return share
+
+    low_s, high_s = 0.0, reach_s
+    for _ in range(50):
+        middle_s = 0.5 * (low_s + high_s)
+        low_s, high_s = (middle_s, high_s) if share_below(middle_s) < 0.5 else (low_s, middle_s)
+    return high_s
+
+
+def _below(sigmas: float) -> float:
+    """Return the share of the clipped Gaussian at or below `sigmas`."""
+    if abs(sigmas) >= _MOST_SIGMAS:
+        return 1.0 if sigmas > 0.0 else 0.0
+    return 0.5 + 0.5 * math.erf(sigmas / math.sqrt(2.0))

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from hil.config.robot import RobotConfig
 
 STEP_US = 100  # RK4 at 1e-4 s (control.md section 2)
+_UNSEEDED = 1 << 31
 _GROUPS = ("motor", "bridge", "battery", "floor")
 
 
@@ -52,8 +53,9 @@ def make_kernel(
         board=board,
     )
     noise_seed = rng.getrandbits(32) << 32
-    for item in disturbances:
-        kernel.add_disturbance(_native.LOADS.index(item.target), *shape_arguments(item, noise_seed))
+    for place, item in enumerate(disturbances):
+        arguments = shape_arguments(item, noise_seed, place)
+        kernel.add_disturbance(_native.LOADS.index(item.target), *arguments)
     for fault in faults:
         if fault.kind in _native.FAULTS:
             kernel.add_fault(
@@ -67,10 +69,15 @@ def make_kernel(
 
 
 def shape_arguments(
-    item: Disturbance, noise_seed: int
+    item: Disturbance, noise_seed: int, place: int = 0
 ) -> tuple[int, float, float, float, float, float, int, tuple[float, float, float]]:
-    """Return the arguments of `_native.disturbance_value` that describe one disturbance."""
+    """Return the arguments of `_native.disturbance_value` that describe one disturbance.
+
+    `place` in the list tells noises apart that have no seed of their own.
+    """
     zone = item.zone
+    # No given seed reaches the upper half: a drawn one is never another's.
+    seed = _UNSEEDED + place if item.seed is None else item.seed
     return (
         _native.SHAPES.index(item.shape),
         item.amplitude,
@@ -78,7 +85,7 @@ def shape_arguments(
         _end_s(item.end_s),
         item.frequency_hz,
         item.phase_rad,
-        noise_seed | item.seed,
+        noise_seed | seed,
         (zone.x_m, zone.y_m, zone.radius_m) if zone else (0.0, 0.0, 0.0),
     )
 

@@ -14,11 +14,11 @@ from random import Random
 from typing import TYPE_CHECKING, Protocol
 
 from hil.core.errors import RigFault
-from hil.core.rig import Frame, Truth
+from hil.core.rig import PORT_BYTES, Frame, LineBacklog, Truth
 from hil.core.types import Pose
 from sim_twin.camera_timing import Exposure, Shutter, Span
 from sim_twin.drawn_poses import DrawnPoses, PoseTuple, load_localiser_error
-from sim_twin.link_model import Channel, Serialiser
+from sim_twin.link_model import BITS_PER_BYTE, Channel, Serialiser
 from sim_twin.setup import make_kernel
 
 if TYPE_CHECKING:
@@ -59,11 +59,17 @@ class TwinSetup:
 
 
 class TwinStream:
-    """Host end of the link: a serial port at the link's baud rate with a radio behind it."""
+    """Host end of the link: a serial port at the link's baud rate with a radio behind it.
+
+    The port holds PORT_BYTES; a host that sends faster than the line carries meets it full (RigFault).
+    """
 
     def __init__(self, twin: Twin, baud: int, down: Channel, arrived: list[bytes]) -> None:
         self._twin = twin
+        self._baud = baud
         self._port = Serialiser(baud)
+        self._backlog = LineBacklog(baud)
+        self._unsent: deque[tuple[float, float, bytes]] = deque()  # begins, has left, bytes
         self._down = down
         self._arrived = arrived
 
@@ -76,10 +82,33 @@ class TwinStream:
         return data
 
     def write(self, data: bytes) -> None:
-        """Send the bytes towards the board."""
-        carried = self._down.carry(self._port.send(self._twin.now_s(), len(data)), data)
-        if carried is not None:
-            self._twin.deliver_to_board(*carried)
+        """Send the bytes towards the board; raises RigFault when the port is full."""
+        now_s = self._twin.now_s()
+        try:
+            self._backlog.write(now_s, len(data))
+        except RigFault as error:
+            raise RigFault(f"twin: {error}") from None
+        left_s = self._port.send(now_s, len(data))
+        self._unsent.append((left_s - len(data) * BITS_PER_BYTE / self._baud, left_s, data))
+
+    def room_bytes(self) -> int:
+        """Return how many bytes `write` takes now."""
+        waiting = self._backlog.waiting_bytes(self._twin.now_s())
+        return max(PORT_BYTES - math.ceil(waiting), 0)
+
+    def discard_unsent(self) -> None:
+        """Forget what the line has not begun to carry."""
+        self._unsent.clear()
+        self._backlog.clear()
+        self._port = Serialiser(self._baud)
+
+    def carry(self, until_s: float) -> None:
+        """Hand the radio what begins to leave the port by `until_s`."""
+        while self._unsent and self._unsent[0][0] <= until_s:
+            _, left_s, data = self._unsent.popleft()
+            carried = self._down.carry(left_s, data)
+            if carried is not None:
+                self._twin.deliver_to_board(*carried)
 
 
 class Twin:
@@ -105,7 +134,8 @@ class Twin:
         self._down = Channel(setup.link, rng("link down"))
         self._up = Channel(setup.link, rng("link up"))
         self._arrived: list[bytes] = []
-        self.stream = TwinStream(self, setup.link.baud, self._down, self._arrived)
+        self._port = TwinStream(self, setup.link.baud, self._down, self._arrived)
+        self.stream = self._port
         self._drawn = DrawnPoses(load_localiser_error(), setup.camera, rng("localiser"))
         self._shutter = Shutter(setup.camera, rng("shutter"), HOST_START_S)
         self._now_s = HOST_START_S
@@ -174,6 +204,7 @@ class Twin:
     def _advance(self, target_s: float) -> bool:
         """Run towards `target_s`; False when the board has sent bytes on the way."""
         target_us = _kernel_us(target_s)
+        self._port.carry(target_s)
         try:
             reached_us = self._kernel.advance(target_us)
         except RuntimeError as error:

@@ -7,6 +7,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -159,14 +160,19 @@ class WheelLoop {
 
 class Board {
  public:
-  Board() { hil::board_init(board_); }
+  explicit Board(const nb::bytes& eeprom) {
+    hil::board_init(board_);
+    eeprom_.fill(0xFF);
+    std::copy_n(data_of(eeprom), std::min<std::size_t>(eeprom.size(), eeprom_.size()), eeprom_.begin());
+    result_ = hil::board_load(board_, read, this);
+  }
 
   void receive(const nb::bytes& data, uint32_t t_us) {
     // In pieces: the length is 16 bits on the board.
     const std::uint8_t* at = data_of(data);
     for (std::size_t left = data.size(); left > 0;) {
-      const auto n = static_cast<uint16_t>(std::min<std::size_t>(left, 0xFFFF));
-      hil::board_receive(board_, at, n, t_us);
+      const auto most = static_cast<uint16_t>(std::min<std::size_t>(left, 0xFFFF));
+      const uint16_t n = hil::board_receive(board_, at, most, t_us);
       at += n;
       left -= n;
     }
@@ -176,6 +182,8 @@ class Board {
                                    uint16_t encoder_faults, uint16_t battery_mv) {
     hil::BoardOutputs out{};
     hil::board_tick(board_, {t_us, counts_left, counts_right, encoder_faults, battery_mv}, out);
+    write_byte();
+    hil::board_slack(board_);
     return {out.pwm_left, out.pwm_right};
   }
 
@@ -185,15 +193,9 @@ class Board {
     return nb::bytes(reinterpret_cast<const char*>(out.data()), n);
   }
 
-  hil::ImageResult load(const nb::bytes& image) {
-    const auto n = static_cast<uint16_t>(std::min<std::size_t>(image.size(), 0xFFFF));
-    return hil::board_load(board_, data_of(image), n);
-  }
-
-  std::optional<nb::bytes> store() {
-    uint8_t image[hil::IMAGE_SIZE];
-    if (!hil::board_store(board_, image)) return std::nullopt;
-    return nb::bytes(reinterpret_cast<const char*>(image), sizeof(image));
+  hil::ImageResult loaded() const { return result_; }
+  nb::bytes eeprom() const {
+    return nb::bytes(reinterpret_cast<const char*>(eeprom_.data()), eeprom_.size());
   }
 
   const hil::Board& state() const { return board_; }
@@ -203,7 +205,18 @@ class Board {
   }
 
  private:
+  static void read(void* self, uint16_t address, uint8_t* out, uint16_t n) {
+    std::copy_n(static_cast<Board*>(self)->eeprom_.begin() + address, n, out);
+  }
+
+  void write_byte() {
+    hil::StoredByte byte{};
+    if (hil::board_store(board_, byte)) eeprom_[byte.address] = byte.value;
+  }
+
   hil::Board board_;
+  std::array<uint8_t, hil::STORAGE_SIZE> eeprom_;
+  hil::ImageResult result_;
 };
 
 void bind_differentiator(nb::module_& m) {
@@ -264,13 +277,13 @@ void bind_board(nb::module_& m) {
       .value("BLANK", hil::ImageResult::BLANK)
       .value("DAMAGED", hil::ImageResult::DAMAGED);
   nb::class_<Board>(m, "Board")
-      .def(nb::init<>())
+      .def(nb::init<const nb::bytes&>(), "eeprom"_a = nb::bytes("", 0))
       .def("receive", &Board::receive, "data"_a, "t_us"_a)
       .def("tick", &Board::tick, "t_us"_a, "counts_left"_a, "counts_right"_a,
            "encoder_faults"_a = 0, "battery_mv"_a = 12000)
       .def("transmit", &Board::transmit, "limit"_a = 256)
-      .def("load", &Board::load, "image"_a)
-      .def("store", &Board::store)
+      .def_prop_ro("loaded", &Board::loaded)
+      .def_prop_ro("eeprom", &Board::eeprom)
       .def("wheel", &Board::wheel, "side"_a, nb::rv_policy::reference_internal)
       .def_prop_ro("state", [](const Board& b) { return b.state().safety.state; })
       .def_prop_ro("reason", [](const Board& b) { return b.state().safety.reason; })
@@ -300,6 +313,9 @@ void bind_facts(nb::module_& m) {
   m.def("safety_next", &hil::safety_next, "state"_a, "conditions"_a);
   m.def("safety_reason", &hil::safety_reason, "conditions"_a);
   m.attr("PWM_TOP") = hil::PWM_TOP;
+  m.attr("IMAGE_SIZE") = hil::IMAGE_SIZE;
+  m.attr("SLOT_SIZE") = hil::SLOT_SIZE;
+  m.attr("ENCODER_COUNTS_1_S") = hil::ENCODER_COUNTS_1_S;
   m.attr("TICK_US") = hil::TICK_US;
   m.attr("BUILD_ID") = HIL_BUILD_ID;
   m.attr("WANTS_ARM") = hil::WANTS_ARM;

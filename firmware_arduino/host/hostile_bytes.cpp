@@ -108,12 +108,19 @@ class Rig {
   explicit Rig(uint64_t seed) : rng{seed * 2654435761u + 1u} { hil::board_init(board); }
 
   void feed(const Bytes& bytes) {
-    hil::board_receive(board, bytes.data(), static_cast<uint16_t>(bytes.size()), t_us);
+    const auto size = static_cast<uint16_t>(bytes.size());
+    for (uint16_t at = 0; at < size;) {
+      at = static_cast<uint16_t>(at + hil::board_receive(board, bytes.data() + at,
+                                                         static_cast<uint16_t>(size - at), t_us));
+    }
   }
 
   void tick(int32_t left, int32_t right, uint16_t faults = 0) {
     hil::BoardOutputs out{};
     hil::board_tick(board, {t_us, left, right, faults, 12000}, out);
+    hil::StoredByte byte;
+    hil::board_store(board, byte);
+    hil::board_slack(board);
     t_us += hil::TICK_US;
     const bool armed = board.safety.state == HIL_STATE_ARMED;
     if (!armed && (out.pwm_left != 0 || out.pwm_right != 0)) fail("wheels driven while not armed");

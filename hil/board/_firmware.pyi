@@ -11,6 +11,12 @@ PWM_TOP: int
 """PWM counts at full duty."""
 TICK_US: int
 """Period of the control tick."""
+IMAGE_SIZE: int
+"""Bytes of a storage image."""
+SLOT_SIZE: int
+"""Bytes from the first storage image to the second."""
+ENCODER_COUNTS_1_S: float
+"""Encoder counts a second of one side that the board can count."""
 BUILD_ID: str
 """First eight hexadecimal digits of the hash of the core's sources."""
 WANTS_ARM: int
@@ -176,7 +182,9 @@ class ImageResult(enum.Enum):
 class Board:
     """The whole board below the pins."""
 
-    def __init__(self) -> None: ...
+    def __init__(self, eeprom: bytes = b"") -> None:
+        """Power up with what the EEPROM holds; what is not given is erased (0xFF)."""
+
     def receive(self, data: bytes, t_us: int) -> None:
         """Take bytes that had arrived by `t_us`."""
 
@@ -193,11 +201,13 @@ class Board:
     def transmit(self, limit: int = 256) -> bytes:
         """Return up to `limit` bytes for the serial port."""
 
-    def load(self, image: bytes) -> ImageResult:
-        """Take parameters from a storage image; anything unsound leaves the defaults."""
+    @property
+    def loaded(self) -> ImageResult:
+        """What became of the EEPROM's images at power-up; BLANK and DAMAGED leave the defaults."""
 
-    def store(self) -> bytes | None:
-        """Return the storage image once after the host asked for it."""
+    @property
+    def eeprom(self) -> bytes:
+        """What the EEPROM holds now; a save writes a byte a tick, two images in turn."""
 
     def wheel(self, side: int) -> Wheel:
         """Return the loop of side 0 (left) or 1 (right)."""

@@ -12,6 +12,7 @@ import click
 from hil import __version__
 from hil.core.errors import HilError
 from hil.core.text import visible
+from hil.runs.interruption import end_as_by_ctrl_c
 
 # name -> (module, one-line help). The text stands here so that `hil --help` imports no command.
 COMMANDS = {
@@ -67,12 +68,13 @@ def cli() -> None:
 
     \b
     Exit status: 0 all requirements held, 1 a requirement failed, 2 bad usage or input,
-    3 rig fault (port, camera, board), 130 stopped by Ctrl-C.
+    3 rig fault (port, camera, board), 130 stopped by Ctrl-C (or SIGTERM, SIGHUP).
     """  # noqa: D301 - \b is click's mark for a verbatim paragraph
 
 
 def main() -> NoReturn:
     """Run the command line; every expected error is one line on stderr and its exit status."""
+    end_as_by_ctrl_c()
     try:
         status = cli.main(prog_name="hil", standalone_mode=False)
         sys.exit(status if isinstance(status, int) else 0)

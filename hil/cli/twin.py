@@ -59,4 +59,6 @@ def serve(
     finally:
         server.close()
         rig.close()
-        click.echo(f"ended; kept real time within {server.worst_lag_s * 1e3:.0f} ms", err=True)
+        slipped = f", {server.slipped_s:.2f} s behind by now" if server.slipped_s else ""
+        lag_ms = 1e3 * server.worst_lag_s
+        click.echo(f"ended; kept real time within {lag_ms:.0f} ms{slipped}", err=True)

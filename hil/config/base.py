@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
@@ -108,3 +109,9 @@ def known_name(registry: Registry) -> AfterValidator:
         return name
 
     return AfterValidator(check)
+
+
+def rounded_up(limit: float) -> str:
+    """Return a positive lower limit to three digits, rounded so that the figure shown holds."""
+    digits = 2 - math.floor(math.log10(limit)) if limit > 0.0 else 0
+    return f"{math.ceil(round(limit * 10.0**digits, 6)) / 10.0**digits:g}"

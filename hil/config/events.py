@@ -5,6 +5,7 @@ Exchanged colour marks are no event but a property of the robot: `camera.marks.s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, Literal, Self
 
@@ -21,19 +22,28 @@ Target = Literal[
     "force_forward_n",  # push along body x
     "force_left_n",  # push along body y
     "torque_yaw_n_m",  # twist about the vertical
-    "load_left_n_m",  # brake torque on the left wheels, positive opposes forward
-    "load_right_n_m",  # brake torque on the right wheels, positive opposes forward
+    "load_left_n_m",  # torque on the left wheels, positive pushes backward, also at rest
+    "load_right_n_m",  # torque on the right wheels, positive pushes backward, also at rest
+    "brake_left_n_m",  # brake on the left wheels: opposes their motion, whichever way
+    "brake_right_n_m",  # brake on the right wheels: opposes their motion, whichever way
     "slope_x_rad",  # floor rises along world X
     "slope_y_rad",  # floor rises along world Y
-    "friction_change_ratio",  # added to 1, scales rolling and sliding friction
-    "battery_sag_v",  # taken off the battery voltage
+    "friction_change_ratio",  # added to 1, scales rolling and sliding friction; from -1 on none
+    "battery_sag_v",  # taken off the battery voltage, which stays above 0
 ]
 TARGET_UNITS: Mapping[str, str] = {
     "eta1_dot_m_s2": "m/s^2", "eta2_dot_m_s2": "m/s^2", "theta_ddot_rad_s2": "rad/s^2",
     "force_forward_n": "N", "force_left_n": "N", "torque_yaw_n_m": "N m",
-    "load_left_n_m": "N m", "load_right_n_m": "N m", "slope_x_rad": "rad", "slope_y_rad": "rad",
+    "load_left_n_m": "N m", "load_right_n_m": "N m",
+    "brake_left_n_m": "N m", "brake_right_n_m": "N m", "slope_x_rad": "rad", "slope_y_rad": "rad",
     "friction_change_ratio": "(ratio)", "battery_sag_v": "V",
 }  # fmt: skip
+# Constant amplitudes below these would drive what they are named to resist.
+LEAST_STEP: dict[str, tuple[float, str]] = {
+    "friction_change_ratio": (-1.0, "no friction is left at -1"),
+    "brake_left_n_m": (0.0, "a brake opposes motion; load_left_n_m drives"),
+    "brake_right_n_m": (0.0, "a brake opposes motion; load_right_n_m drives"),
+}
 Shape = Literal["sine", "step", "pulse", "noise"]
 FaultKind = Literal[
     "dead_encoder",  # both channels of one side stay as they are
@@ -72,6 +82,7 @@ class Disturbance(Section):
 
     sine: amplitude sin(2 pi frequency (t - start) + phase); step: amplitude; pulse: half a sine
     from start to end; noise: seeded, standard deviation `amplitude`, band up to `frequency_hz`.
+    Friction below none, a brake below 0 and a battery below 0 V count as 0.
     """
 
     target: Target = Field(description="what it acts on")
@@ -81,7 +92,10 @@ class Disturbance(Section):
     end_s: float | None = quantity("s", "None: to the end of the run", None, gt=0, le=3600)
     frequency_hz: float = quantity("Hz", "of the sine, or top of the noise", 0.5, gt=0, le=200)
     phase_rad: float = quantity("rad", "of the sine", 0.0, ge=-7, le=7)
-    seed: int = quantity("", "of the noise, with the seed of the run", 1, ge=0, le=2**31 - 1)
+    seed: int | None = quantity(
+        "", "of the noise, with the seed of the run; None: its own, from its place in the list. "
+        "Noises of one seed and frequency are one signal", None, ge=0, le=2**31 - 1,
+    )  # fmt: skip
     zone: Zone | None = Field(None, description="acts only while the centre of mass is in there")
 
     @classmethod
@@ -96,6 +110,11 @@ class Disturbance(Section):
         _check_times(self.start_s, self.end_s)
         if self.shape == "pulse" and self.end_s is None:
             raise ValueError("a pulse needs end_s")
+        least, why = LEAST_STEP.get(self.target, (-math.inf, ""))
+        if self.shape == "step" and self.amplitude < least:
+            raise ValueError(
+                f"amplitude {self.amplitude:g} of {self.target} must be at least {least:g}: {why}"
+            )
         return self
 
 

@@ -6,13 +6,14 @@ from typing import Self
 
 from pydantic import model_validator
 
-from hil.config.base import Section, quantity
+from hil.config.base import Section, quantity, rounded_up
 
 
 class LinkConfig(Section):
     """Both directions alike; delay of one chunk is latency + jitter * u, u uniform in -1..1.
 
-    Chunks never overtake each other and never arrive before they were sent.
+    Chunks never overtake each other and never arrive before they were sent: where the jitter is
+    larger than the latency or than their distance, the mean delay is above `latency_s`.
     """
 
     baud: int = quantity(
@@ -36,6 +37,8 @@ class LinkConfig(Section):
     def _bursts_long_enough(self) -> Self:
         """Between two bursts one chunk passes at least, which bounds the loss from above."""
         least = self.loss_ratio / (1.0 - self.loss_ratio)
-        if self.loss_burst_chunks < least:
-            raise ValueError(f"loss_burst_chunks must be at least {least:.3g} at this loss_ratio")
+        if self.loss_burst_chunks < least * (1.0 - 1e-9):  # 0.9 / (1 - 0.9) is a little above 9
+            raise ValueError(
+                f"loss_burst_chunks must be at least {rounded_up(least)} at this loss_ratio"
+            )
         return self

@@ -11,8 +11,11 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hil.config.base import PlainName, Section, quantity
+from hil.config.base import PlainName, Section, quantity, rounded_up
 from hil.config.limits import board_table
+
+# Wheels and reflected rotors of one side; the lightest toy has ten times as much.
+_LEAST_SIDE_KG_M2 = 1e-5
 
 
 class MotorConfig(Section):
@@ -128,6 +131,12 @@ class RobotConfig(Section):
     floor: FloorConfig
     bring_up: BringUpConfig | None = Field(None, description="measured, for people to compare with")
 
+    @property
+    def no_load_rad_s(self) -> float:
+        """Return the wheel speed at which the motors' voltage is the full battery's."""
+        motor = self.motor
+        return self.battery.full_v / (motor.emf_constant_v_s_rad * motor.gear_ratio)
+
     @model_validator(mode="after")
     def _current_slow_enough(self) -> Self:
         """RK4 at 1e-4 s is stable up to rates of 27,850 1/s; refuse a robot that comes near."""
@@ -135,7 +144,22 @@ class RobotConfig(Section):
         rate = self.motor.resistance_ohm + self.motor.per_side * channel_ohm
         if rate / self.motor.inductance_h > 20_000:
             least_h = rate / 20_000
-            raise ValueError(f"motor.inductance_h must be at least {least_h:.2g} H at these drops")
+            raise ValueError(
+                f"motor.inductance_h must be at least {rounded_up(least_h)} H at these drops"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _sides_have_inertia(self) -> Self:
+        """Wheels that turn by themselves are divided by it; less than this RK4 cannot follow."""
+        motor = self.motor
+        rotors = motor.per_side * motor.gear_ratio**2 * motor.rotor_inertia_kg_m2
+        side = rotors + 2.0 * self.wheel_inertia_kg_m2
+        if self.variant != "constrained" and side < _LEAST_SIDE_KG_M2:
+            raise ValueError(
+                f"wheel_inertia_kg_m2 and motor.rotor_inertia_kg_m2 give a side {side:.2g} kg m^2, "
+                f"variant {self.variant} needs at least {_LEAST_SIDE_KG_M2:g} kg m^2"
+            )
         return self
 
     @model_validator(mode="after")

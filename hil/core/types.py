@@ -108,8 +108,22 @@ class Estimator(Protocol):
     def on_wheels(self, sample: WheelSample) -> None:
         """Take one wheel report (in time order)."""
 
-    def on_pose(self, t_exposure_s: float, measurement: PoseMeasurement) -> None:
-        """Take the pose seen at exposure time `t_exposure_s`, which lies in the past."""
+    def on_pose(self, t_exposure_s: float, measurement: PoseMeasurement) -> bool:
+        """Take the pose seen at exposure time `t_exposure_s`, which lies in the past.
+
+        Return whether it was believed.
+        """
+
+    def agreement_age_s(self, t_host_s: float) -> float:
+        """Return the time since a pose last agreed with the wheels; inf before the first pose."""
+
+    @property
+    def refused(self) -> tuple[float, float, float]:
+        """The last pose not believed minus the pose expected then: m, m, rad; zero before one."""
+
+    @property
+    def scales(self) -> tuple[float, float]:
+        """What the camera sees of a metre and of a radian that the wheels turn."""
 
     def on_command(self, t_effect_s: float, eta1_m_s: float, theta_dot_rad_s: float) -> None:
         """Take the body speeds commanded to be in effect from `t_effect_s` on."""

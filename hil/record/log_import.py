@@ -280,9 +280,7 @@ def _completed(signals: Signals, scenario: Scenario) -> dict[str, Array]:
         "delta1_y_m": z1[1] - goal[:, 1],
     }
     columns = {name: np.full(t_s.size, math.nan) for name in SAMPLE_NAMES} | derived | given
-    geometry = BelievedGeometry(
-        robot.wheel_radius_m, robot.track_m, robot.d0_m, robot.encoder_counts_per_turn
-    )
+    geometry = BelievedGeometry.of(robot)
     if "eta1_cmd_m_s" in given and "omega_cmd_left_rad_s" not in given:
         pairs = zip(columns["eta1_cmd_m_s"], columns["theta_dot_cmd_rad_s"], strict=True)
         wheels = np.array([geometry.wheels(float(eta1), float(turn)) for eta1, turn in pairs])

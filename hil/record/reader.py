@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from hil.core.errors import BadInput
 from hil.record import layout
 from hil.record.journal import Columns, read_journal, read_parquet
 from hil.record.manifest import Manifest, file_entry, read_manifest
-from hil.record.schema import FRAME_NAMES, SAMPLE_NAMES
+from hil.record.schema import ADDED_LATER, FRAME_NAMES, SAMPLE_NAMES
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +107,8 @@ def read_run(path: Path) -> RunRecord:
         problems.append("cut off in mid-run: the record was never closed")
     problems += altered_files(path, manifest)
     samples = read_table(path, layout.SAMPLES, layout.SAMPLES_JOURNAL, required=True)
+    rows = samples["t_s"].size if "t_s" in samples else 0
+    samples = {name: np.full(rows, math.nan) for name in ADDED_LATER} | samples
     missing = [name for name in SAMPLE_NAMES if name not in samples]
     if missing:
         raise BadInput(f"{path / layout.SAMPLES}: damaged: column {missing[0]} is missing")

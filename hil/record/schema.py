@@ -82,7 +82,8 @@ SAMPLE_COLUMNS = (
     *_sides("pwm", "counts", "counts", "PWM, positive is forward"),
     *_sides("wheel_s", "rad_s", "rad/s", "sliding variable of the wheel law"),
     Column("battery_v", "V", "power", "battery voltage measured by the board"),
-    Column("pose_seen", "", "latency", "a pose was accepted since the last tick", "bool"),
+    Column("pose_seen", "", "latency", "the localiser gave a pose since the last tick", "bool"),
+    Column("pose_accepted", "", "latency", "the estimator believed one of them", "bool"),
     Column("pose_quality", "", "latency", "quality of the newest pose, 0 to 1"),
     Column("camera_latency_s", "s", "latency", "exposure to host of the newest frame"),
     Column("exposure_to_actuation_s", "s", "latency", "exposure to the command's effect"),
@@ -109,6 +110,9 @@ FRAME_COLUMNS = (
     Column("rear_u_px", "px", "marks", "rear mark, image column"),
     Column("rear_v_px", "px", "marks", "rear mark, image row"),
 )
+
+# Columns that records made before them do not have: not known there.
+ADDED_LATER = ("pose_accepted",)
 
 SAMPLE_NAMES = tuple(column.name for column in SAMPLE_COLUMNS)
 FRAME_NAMES = tuple(column.name for column in FRAME_COLUMNS)

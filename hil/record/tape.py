@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.core.errors import BadInput, RigFault
+from hil.core.rig import PORT_BYTES, PortStream, discard_unsent
 
 if TYPE_CHECKING:
     from hil.core.rig import ByteStream, Frame, Rig, Truth
@@ -85,6 +86,15 @@ class TapedStream:
         except (RigFault, KeyboardInterrupt) as cause:
             self._tape.stop(IN_WRITE, cause)
             raise
+
+    def room_bytes(self) -> int:
+        """Return how many bytes `write` takes now."""
+        inner = self._stream
+        return inner.room_bytes() if isinstance(inner, PortStream) else PORT_BYTES
+
+    def discard_unsent(self) -> None:
+        """Let the stream forget what it still holds."""
+        discard_unsent(self._stream)
 
 
 class TapedRig:

@@ -27,14 +27,14 @@ def sample_row(
     command: OuterCommand,
     wheels_rad_s: Vec2,
     report: WheelReport | None,
-    latency: tuple[float, float, float, float],
+    latency: tuple[float, float, float, float, float],
     link: BoardLink,
     late: bool,
 ) -> tuple[float, ...]:
     """Return one outer tick in the order of schema.SAMPLE_NAMES; NaN for what is not known.
 
-    `latency` is (pose accepted since the last tick, its quality, exposure to host in s, exposure
-    to actuation in s).
+    `latency` is (pose seen since the last tick, pose accepted since then, quality of the newest,
+    exposure to host in s, exposure to actuation in s).
     """
     return (
         t_s,

@@ -20,7 +20,7 @@ from hil.core.registries import OUTER_LAWS
 from hil.core.types import Estimate, OuterCommand, OuterLaw, ReferenceState
 from hil.record import layout
 from hil.record.memory import MemoryRecorder
-from hil.record.schema import FRAME_NAMES, SAMPLE_NAMES
+from hil.record.schema import ADDED_LATER, FRAME_NAMES, SAMPLE_NAMES
 from hil.record.source import Source, load_plugins, read_source, recorded_scenario
 from hil.record.tlog import LoggedFrame
 from hil.replays.divergence import Channel, compare_columns, compare_link
@@ -182,7 +182,8 @@ def _channels(
     """Compare all that was computed again with what the record has of it."""
     found: list[Channel] = []
     if source.samples:
-        names = [name for name in SAMPLE_NAMES if name not in _GIVEN]
+        there = [name for name in SAMPLE_NAMES if name in source.samples or name not in ADDED_LATER]
+        names = [name for name in there if name not in _GIVEN]
         found += compare_columns(source.samples, samples, names, source.samples["t_s"])
     if source.frames:
         dated = source.frames["t_arrival_s"]

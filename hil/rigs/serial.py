@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import math
 import os
 import re
 import select
@@ -11,8 +13,13 @@ import time
 import serial
 
 from hil.core.errors import BadInput, RigFault
-from hil.core.rig import ByteStream, Frame, Truth
+from hil.core.rig import PORT_BYTES, ByteStream, Frame, LineBacklog, Truth
 from hil.rigs.frames import FrameSource
+
+try:
+    from termios import error as termios_error
+except ImportError:  # Windows has none
+    termios_error = OSError  # type: ignore[misc,assignment]
 
 DEFAULT_BAUD = 57_600
 # Where select cannot wait for a port (Windows), it is looked at this often.
@@ -36,6 +43,7 @@ class SerialStream:
 
     def __init__(self, device: str, baud: int) -> None:
         self.device = device
+        self._backlog = LineBacklog(baud)
         try:
             self.port = serial.Serial(device, baud, timeout=0, write_timeout=0.2, exclusive=True)
         except (serial.SerialException, OSError, ValueError) as error:
@@ -49,11 +57,24 @@ class SerialStream:
             raise RigFault(f"port {self.device}: {_reason(error)}") from None
 
     def write(self, data: bytes) -> None:
-        """Send the bytes; raises RigFault when the port is gone or takes none for 0.2 s."""
+        """Send the bytes; raises RigFault when the port is gone, full, or takes none for 0.2 s."""
         try:
+            self._backlog.write(time.monotonic(), len(data))
             self.port.write(data)
+        except RigFault as error:
+            raise RigFault(f"port {self.device}: {error}") from None
         except (serial.SerialException, OSError) as error:
             raise RigFault(f"port {self.device}: {_reason(error)}") from None
+
+    def room_bytes(self) -> int:
+        """Return how many bytes `write` takes now."""
+        return max(PORT_BYTES - math.ceil(self._backlog.waiting_bytes(time.monotonic())), 0)
+
+    def discard_unsent(self) -> None:
+        """Forget what has been written and not sent yet."""
+        self._backlog.clear()
+        with contextlib.suppress(serial.SerialException, OSError, termios_error):
+            self.port.reset_output_buffer()
 
     def close(self) -> None:
         """Release the port; safe to call twice."""
@@ -66,6 +87,7 @@ _REASONS = {
     errno.EPERM: "no permission; add yourself to the group dialout and log in again",
     errno.EBUSY: "in use by another program; close it first",
     errno.EAGAIN: "in use by another program; close it first",
+    errno.EISDIR: "not a serial port; `hil doctor` lists the ports",
     errno.ENOTTY: "not a serial port; `hil doctor` lists the ports",
     errno.EIO: "gone while in use; was it unplugged or switched off?",
     errno.ENXIO: "gone while in use; was it unplugged or switched off?",

@@ -14,6 +14,7 @@ import cv2
 from hil.analysis.metrics import LinkStats
 from hil.config.fit import check_fit
 from hil.config.limits import wheel_speed_max_rad_s
+from hil.config.load import check_edges
 from hil.control.estimators.geometry import BelievedGeometry
 from hil.control.estimators.making import make_estimator
 from hil.control.laws.hold import HoldAtGoal
@@ -154,11 +155,13 @@ def execute_in_memory(spec: RunSpec, rig: Rig | None = None) -> RunRecord:
 
 
 def board_parameters(scenario: Scenario, inner: str) -> dict[str, float]:
-    """Return every board parameter as this run needs it."""
-    return scenario.board | {
+    """Return every board parameter as this run needs it; raises BadInput where the board cannot count."""
+    parameters = scenario.board | {
         "ENC_COUNTS": float(scenario.robot.encoder_counts_per_turn),
         "LAW": INNER_LAWS[inner],
     }
+    check_edges(parameters)
+    return parameters
 
 
 def make_law(spec: RunSpec) -> OuterLaw:
@@ -192,9 +195,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
     """Return the parts of a session over `rig`; `law` is another one than a new one of the spec."""
     scenario, control = spec.scenario, spec.scenario.control
     robot = scenario.robot
-    geometry = BelievedGeometry(
-        robot.wheel_radius_m, robot.track_m, robot.d0_m, robot.encoder_counts_per_turn
-    )
+    geometry = BelievedGeometry.of(robot)
     timeline = Timeline(recorder, _unix_us)
     return Parts(
         rig=rig,

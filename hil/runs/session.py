@@ -12,7 +12,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from hil.core.errors import RigFault
+from hil.core.types import PoseMeasurement
 from hil.record.tick_rows import sample_row
+from hil.runs.supervision import Supervisor
 from hil.wire import handshake
 from hil.wire.refusal import refused_set_point
 
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from hil.control.references import Reference
     from hil.core.clocks import CameraClock
     from hil.core.rig import Frame, Rig
-    from hil.core.types import Estimate, Estimator, OuterCommand, OuterLaw, PoseMeasurement
+    from hil.core.types import Estimate, Estimator, OuterCommand, OuterLaw
     from hil.record.memory import RunSink
     from hil.record.timeline import Timeline
     from hil.wire.link import BoardLink, WheelReport
@@ -93,7 +95,10 @@ class Session:
         self._refusal = ""
         self._report: WheelReport | None = None
         self._measurement: PoseMeasurement | None = None
-        self._pose_time_s = self._pose_time_recorded_s = -math.inf
+        self._supervisor = Supervisor(scenario.safety, parts.estimator)
+        self._pose_time_s = -math.inf  # of the newest pose believed
+        self._seen = self._accepted = False  # since the last tick
+        self._camera_restarts = 0
         self._camera_latency_s = math.nan
         self._poses = 0
         self._uplink_s = scenario.link.latency_s
@@ -266,62 +271,56 @@ class Session:
             self._refusal = self._refusal or refused_set_point(text)
 
     def _take_frame(self, frame: Frame, now_s: float) -> None:
-        """Localise one frame and hand the pose to the estimator at its exposure time."""
-        parts = self._parts
-        parts.camera_clock.arrival(frame.t_cam_s, now_s)
-        exposure_s = parts.camera_clock.to_host_s(frame.t_cam_s)
-        measurement = frame.pose
-        if measurement is None:
-            assert frame.image is not None
-            before = parts.estimator.estimate_at(exposure_s)
-            measurement = parts.localiser.locate(
-                frame.image,
-                before.pose if before is not None else None,
-                self._scenario.camera.search_radius_m,
-            )
+        """Localise one frame and hand the pose to the estimator at its exposure time.
+
+        A frame whose stamp the camera's clock refuses is recorded and not looked at.
+        """
+        parts, clock = self._parts, self._parts.camera_clock
+        stamped = clock.arrival(frame.t_cam_s, now_s)
+        exposure_s = clock.to_host_s(frame.t_cam_s)
+        if clock.restarts != self._camera_restarts:
+            self._camera_restarts = clock.restarts
+            self._note("camera", f"its clock has stepped by {clock.step_s:+.3f} s; tied anew")
+        if not stamped:
+            measurement = PoseMeasurement(None, 0.0, _odd_stamp(exposure_s - now_s))
+        else:
+            exposure_s = min(exposure_s, now_s)  # jitter aside, no frame is exposed after it came
+            measurement = self._measured(frame, exposure_s)
+            self._camera_latency_s = now_s - exposure_s
         self._measurement = measurement
-        self._camera_latency_s = now_s - exposure_s
         if measurement.pose is not None:
             self._poses += 1
-            self._pose_time_s = exposure_s
-            parts.estimator.on_pose(exposure_s, measurement)
+            self._seen = True
+            if parts.estimator.on_pose(exposure_s, measurement):
+                self._pose_time_s = exposure_s
+                self._accepted = True
+        self._supervisor.saw(exposure_s, measurement)
         parts.timeline.camera_frame(frame, now_s, exposure_s, measurement)
 
     def _check_safety(self, now_s: float) -> None:
         """Raise RigFault when the host itself must stop the robot."""
-        safety, link = self._scenario.safety, self._parts.link
         if self._refusal:
             raise RigFault(f"board: {self._refusal}")
-        if not link.armed:
-            raise RigFault(f"board: left ARMED by itself: {link.state_name}")
-        silent_s = now_s - (self._report.t_arrival_s if self._report else -math.inf)
-        if silent_s > safety.link_lost_s:
-            raise RigFault(
-                f"link: no wheel report for {silent_s:.2f} s (limit {safety.link_lost_s:g} s)"
-            )
-        unseen_s = now_s - self._pose_time_s
-        if unseen_s > safety.pose_lost_s:
-            reason = self._measurement.reason if self._measurement else ""
-            raise RigFault(
-                f"camera: robot not seen for {unseen_s:.2f} s (limit {safety.pose_lost_s:g} s)"
-                f"{': ' + reason if reason else ''}"
-            )
+        self._supervisor.check(now_s, self._parts.link, self._report)
+
+    def _measured(self, frame: Frame, exposure_s: float) -> PoseMeasurement:
+        """Return the frame's own pose, else what the localiser finds near the estimate."""
+        if frame.pose is not None:
+            return frame.pose
+        assert frame.image is not None
+        before = self._parts.estimator.estimate_at(exposure_s)
+        return self._parts.localiser.locate(
+            frame.image,
+            before.pose if before is not None else None,
+            self._scenario.camera.search_radius_m,
+        )
 
     def _estimate(self, t_effect_s: float) -> Estimate:
         """Return the state at the actuation time, inside the fence; else RigFault."""
         estimate = self._parts.estimator.estimate_at(t_effect_s)
         if estimate is None:
             raise RigFault("camera: no pose to estimate from")
-        fence, pose = self._scenario.safety, estimate.pose
-        if not (
-            fence.fence_x_min_m <= pose.x_m <= fence.fence_x_max_m
-            and fence.fence_y_min_m <= pose.y_m <= fence.fence_y_max_m
-        ):
-            raise RigFault(
-                f"geofence: robot at ({pose.x_m:.3f}, {pose.y_m:.3f}) m, allowed X "
-                f"{fence.fence_x_min_m:g} to {fence.fence_x_max_m:g} m, Y "
-                f"{fence.fence_y_min_m:g} to {fence.fence_y_max_m:g} m"
-            )
+        self._supervisor.check_estimate(estimate)
         return estimate
 
     # -- out -----------------------------------------------------------------------------------
@@ -356,7 +355,8 @@ class Session:
                 wheels_rad_s=wheels,
                 report=self._report,
                 latency=(
-                    self._pose_time_s > self._pose_time_recorded_s,
+                    self._seen,
+                    self._accepted,
                     self._measurement.quality if self._measurement else math.nan,
                     self._camera_latency_s,
                     now_s + self._uplink_s - self._pose_time_s,
@@ -365,4 +365,11 @@ class Session:
                 late=late,
             )
         )
-        self._pose_time_recorded_s = self._pose_time_s
+        self._seen = self._accepted = False
+
+
+def _odd_stamp(ahead_s: float) -> str:
+    """Return why a frame is not looked at whose exposure would lie `ahead_s` after its arrival."""
+    if ahead_s > 0.0:
+        return f"stamped {ahead_s:.3f} s later than it came"
+    return "stamped earlier than a frame before it, or not at all"

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hil.config.limits import check_board
+from hil.config.load import check_edges
 from hil.core.errors import BadInput
 from hil.record.manifest import replace_file
 from hil.rigs.serial import SerialRig, parse_target
@@ -41,13 +42,14 @@ class Board:
     def set(self, values: Mapping[str, float]) -> None:
         """Set parameters; raises BadInput before anything is sent, RigFault when refused."""
         check_board(values)
+        check_edges(self.parameters | dict(values))
         for name, value in values.items():
             handshake.finish(
                 self._link, self._rig, handshake.set_parameter(self._link, name, value)
             )
 
     def store(self) -> None:
-        """Keep the parameters in force in the EEPROM."""
+        """Keep the parameters in force in the EEPROM; returns when the last byte is written."""
         handshake.finish(self._link, self._rig, handshake.store(self._link))
 
 

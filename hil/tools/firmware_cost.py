@@ -13,6 +13,7 @@ from hil.config.camera import CameraConfig
 from hil.config.link import LinkConfig
 from hil.config.robot import RobotConfig
 from hil.core.types import Pose
+from hil.tools.frame_cost import FrameCost, measure_frames
 from hil.wire import handshake
 from hil.wire.link import BoardLink
 from sim_twin.pil import Pil
@@ -50,6 +51,7 @@ class FirmwareCost:
     encoder_interrupt_cycles: int
     interrupts_off_cycles: int
     edges_lost: int
+    frames: FrameCost
 
 
 class _Bench:
@@ -110,6 +112,8 @@ def measure(robot: RobotConfig, parameters: Mapping[str, float] | None = None) -
     board.stop_profile()
     share = {name: count / CLOCK_HZ for name, count in zip(parts.names, by_part, strict=True)}
     interrupts = board.usage()["interrupts"]
+    longest_tick_us = 1e-3 * bench.link.sys_status.load * _firmware.TICK_US
+    frames = measure_frames(bench.rig, bench.link)
     full, awake_full_ratio = _full_encoders(robot, changes)
     counted = (full.last.left_counts, full.last.right_counts)
     return FirmwareCost(
@@ -120,10 +124,11 @@ def measure(robot: RobotConfig, parameters: Mapping[str, float] | None = None) -
         tick_and_link_ratio=sum(v for name, v in share.items() if name.startswith(_TICK_AND_LINK)),
         awake_ratio=awake_ratio,
         awake_full_ratio=awake_full_ratio,
-        longest_tick_us=1e-3 * bench.link.sys_status.load * _firmware.TICK_US,
+        longest_tick_us=longest_tick_us,
         encoder_interrupt_cycles=max(interrupts[vector][2] for vector in _ENCODER_VECTORS),
         interrupts_off_cycles=interrupts_off,
         edges_lost=sum(abs(a - b) for a, b in zip(counted, full.rig.true_counts, strict=True)),
+        frames=frames,
     )
 
 
@@ -149,6 +154,9 @@ def budgets(cost: FirmwareCost) -> list[tuple[str, float, str, str]]:
         ("encoder interrupt", cost.encoder_interrupt_cycles, "cycles", "<= 100"),
         ("longest stretch with interrupts off", cost.interrupts_off_cycles, "cycles", ""),
         ("longest tick", cost.longest_tick_us, "us", "<= 4000"),
+        ("costliest frame, all that follows from it", cost.frames.costliest_us, "us", "<= 4000"),
+        ("latest begin of a tick in a flood of frames", cost.frames.latest_us, "us", "<= 1000"),
+        ("ticks late under a flood of frames", cost.frames.overruns, "", "0"),
         ("flash", cost.flash_bytes, "bytes", f"<= {FLASH_LIMIT_BYTES}"),
         ("static RAM", cost.ram_bytes, "bytes", f"<= {RAM_LIMIT_BYTES}"),
         ("deepest stack", cost.stack_bytes, "bytes", "<= 1024"),

@@ -19,7 +19,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.core.errors import BadInput
+from hil.core.rig import PORT_BYTES, PortStream
 from hil.rigs.frames import encode_frame
+from hil.tools.serve_names import PortName, bind_socket, release_socket
 from hil.wire import dialect
 from hil.wire.framing import FrameReader
 
@@ -28,6 +30,9 @@ if TYPE_CHECKING:
 
 # The twin's events are looked for this often; bytes and frames are late by no more.
 _STEP_S = 0.001
+# A server that was held up by more than this does not make up for it: the host's bytes carry no times, and
+# those that waited would all come at the start of the time that was missed. A frame drawn late is not it.
+_SLIP_S = 0.1
 # Frames kept for a client that reads slowly; beyond that the oldest are dropped, as by a camera.
 _BACKLOG_FRAMES = 4
 
@@ -36,20 +41,23 @@ class PseudoTerminal:
     """The board's port: a raw pseudo-terminal with a stable name."""
 
     def __init__(self, link: Path) -> None:
-        self._link = link
         self._master, self._slave = os.openpty()  # the slave stays open, or a hang-up ends it all
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
-        _replace_link(link, os.ttyname(self._slave))
+        try:
+            self._name = PortName(link, os.ttyname(self._slave))
+        except BadInput:
+            self._close_ends()
+            raise
 
     def fileno(self) -> int:
         """Return the descriptor that is readable when the host has sent bytes."""
         return self._master
 
-    def read(self) -> bytes:
-        """Return what the host has sent, b"" if nothing."""
+    def read(self, limit: int) -> bytes:
+        """Return up to `limit` bytes of what the host has sent, b"" if nothing."""
         try:
-            return os.read(self._master, 4096)
+            return os.read(self._master, limit)
         except BlockingIOError:
             return b""
 
@@ -60,23 +68,12 @@ class PseudoTerminal:
 
     def close(self) -> None:
         """Remove the name and close both ends."""
-        with contextlib.suppress(OSError):
-            self._link.unlink()
+        self._name.release()
+        self._close_ends()
+
+    def _close_ends(self) -> None:
         os.close(self._master)
         os.close(self._slave)
-
-
-def _replace_link(link: Path, device: str) -> None:
-    """Make `link` point at the device; a link left by an earlier server is replaced."""
-    try:
-        if link.is_symlink():
-            link.unlink()
-        link.parent.mkdir(parents=True, exist_ok=True)
-        link.symlink_to(device)
-    except OSError as error:
-        raise BadInput(
-            f"--pty {link}: {error.strerror}; choose a path that does not exist"
-        ) from None
 
 
 class FrameServer:
@@ -88,12 +85,10 @@ class FrameServer:
         self._clients: dict[socket.socket, deque[memoryview]] = {}
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
-            if path.is_socket():
-                path.unlink()
-            self._listener.bind(str(path))
-        except OSError as error:
+            self._identity = bind_socket(self._listener, path)
+        except BadInput:
             self._listener.close()
-            raise BadInput(f"--frames {path}: {error.strerror}; choose another path") from None
+            raise
         self._listener.listen()
         self._listener.setblocking(False)
         selector.register(self._listener, selectors.EVENT_READ, self._accept)
@@ -137,12 +132,14 @@ class FrameServer:
         self._selector.unregister(self._listener)
         for client in (*self._clients, self._listener):
             client.close()
-        with contextlib.suppress(OSError):
-            self._path.unlink()
+        release_socket(self._path, self._identity)
 
 
 class TwinServer:
-    """Lets a simulated rig follow this machine's clock and passes its bytes and frames on."""
+    """Lets a simulated rig follow this machine's clock and passes its bytes and frames on.
+
+    `worst_lag_s` is the most the twin was behind, `slipped_s` what its clock was put back for good.
+    """
 
     def __init__(self, rig: Rig, pty: Path, frames: Path) -> None:
         self._rig = rig
@@ -153,17 +150,23 @@ class TwinServer:
         except BadInput:
             self.port.close()
             raise
-        self._selector.register(self.port, selectors.EVENT_READ, self._from_host)
+        self._listening = False
         self._watcher = FrameReader()
         self._armed = False
         self.worst_lag_s = 0.0
+        self.slipped_s = 0.0
 
     def run(self, until_s: float) -> None:
         """Serve until this machine's monotonic clock shows `until_s`."""
         ahead_s = self._rig.now_s() - time.monotonic()
         while (now_s := time.monotonic()) < until_s:
-            self.worst_lag_s = max(self.worst_lag_s, now_s + ahead_s - self._rig.now_s())
+            lag_s = now_s + ahead_s - self._rig.now_s()
+            self.worst_lag_s = max(self.worst_lag_s, lag_s)
+            if lag_s > _SLIP_S:
+                ahead_s -= lag_s - _STEP_S
+                self.slipped_s += lag_s - _STEP_S
             self._follow(now_s + ahead_s)
+            self._listen()
             for key, _ in self._selector.select(_STEP_S):
                 key.data()
 
@@ -179,8 +182,23 @@ class TwinServer:
                     self._camera.send(encode_frame(frame))
         self._camera.flush()
 
+    def _room_bytes(self) -> int:
+        stream = self._rig.stream
+        return stream.room_bytes() if isinstance(stream, PortStream) else PORT_BYTES
+
+    def _listen(self) -> None:
+        """Listen to the host while the line has room; without, the pseudo-terminal fills and blocks."""
+        room = self._room_bytes() > 0
+        if room == self._listening:
+            return
+        self._listening = room
+        if room:
+            self._selector.register(self.port, selectors.EVENT_READ, self._from_host)
+        else:
+            self._selector.unregister(self.port)
+
     def _from_host(self) -> None:
-        if data := self.port.read():
+        if data := self.port.read(self._room_bytes()):
             self._rig.stream.write(data)
 
     def _watch(self, data: bytes) -> None:

@@ -471,8 +471,10 @@ MAV_RESULT_UNSUPPORTED = 3
 enums["MAV_RESULT"][3] = EnumEntry("MAV_RESULT_UNSUPPORTED", """""")
 MAV_RESULT_FAILED = 4
 enums["MAV_RESULT"][4] = EnumEntry("MAV_RESULT_FAILED", """""")
-MAV_RESULT_ENUM_END = 5
-enums["MAV_RESULT"][5] = EnumEntry("MAV_RESULT_ENUM_END", """""")
+MAV_RESULT_IN_PROGRESS = 5
+enums["MAV_RESULT"][5] = EnumEntry("MAV_RESULT_IN_PROGRESS", """""")
+MAV_RESULT_ENUM_END = 6
+enums["MAV_RESULT"][6] = EnumEntry("MAV_RESULT_ENUM_END", """""")
 
 # MAV_PARAM_TYPE
 enums["MAV_PARAM_TYPE"] = Enum()
@@ -2028,7 +2030,7 @@ class MAVLink(object):
         current_battery           : -1: not measured. [cA] (type:int16_t)
         battery_remaining         : -1: not measured. [%] (type:int8_t)
         drop_rate_comm            : Share of frames from the host lost on the way since start. [c%] (type:uint16_t)
-        errors_comm               : Frames received with a wrong checksum or length. (type:uint16_t)
+        errors_comm               : Frames received with a wrong checksum or length. This and the counts below stay at 65535 once they are there. (type:uint16_t)
         errors_count1             : Tick overruns. (type:uint16_t)
         errors_count2             : Frames lost from the host (gaps in the sequence). (type:uint16_t)
         errors_count3             : Frames to the host dropped because the buffer was full. (type:uint16_t)
@@ -2049,7 +2051,7 @@ class MAVLink(object):
         current_battery           : -1: not measured. [cA] (type:int16_t)
         battery_remaining         : -1: not measured. [%] (type:int8_t)
         drop_rate_comm            : Share of frames from the host lost on the way since start. [c%] (type:uint16_t)
-        errors_comm               : Frames received with a wrong checksum or length. (type:uint16_t)
+        errors_comm               : Frames received with a wrong checksum or length. This and the counts below stay at 65535 once they are there. (type:uint16_t)
         errors_count1             : Tick overruns. (type:uint16_t)
         errors_count2             : Frames lost from the host (gaps in the sequence). (type:uint16_t)
         errors_count3             : Frames to the host dropped because the buffer was full. (type:uint16_t)

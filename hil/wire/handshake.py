@@ -20,6 +20,9 @@ from hil.wire.link import BoardLink, Procedure, enum_name
 _FIRST_HEARTBEAT_S = 6.0
 _REPLY_S = 0.5
 _TRIES = 10
+# A save takes the board 0.86 s, a byte a tick.
+_STORED_S = 2.0
+_UNDER_WAY = dialect.MAV_RESULT_IN_PROGRESS
 # A PARAM_VALUE takes 6.4 ms at 57,600 baud, and half of the line belongs to the wheel states.
 _PARAMETER_PACE_S = 0.02
 # The board says at most five texts a second.
@@ -154,8 +157,20 @@ def disarm(link: BoardLink) -> Procedure:
 
 
 def store(link: BoardLink) -> Procedure:
-    """Keep the parameters in force in the board's EEPROM."""
-    yield from _command(link, "store", dialect.MAV_CMD_PREFLIGHT_STORAGE, 1.0)
+    """Keep the parameters in force in the board's EEPROM; ends when the last byte is written.
+
+    A board that was reset meanwhile has other parameters in force, and stored: RigFault.
+    """
+    yield from read_info(link)
+    complete = len(link.parameters) == link.parameter_count > 0
+    wanted = identity.parameter_hash(link.parameters) if complete else int(link.info.parameter_hash)
+    yield from _command(link, "store", dialect.MAV_CMD_PREFLIGHT_STORAGE, 1.0, reply_s=_STORED_S)
+    yield from read_info(link)
+    if link.info.parameter_hash != wanted:
+        raise RigFault(
+            "board: was reset before its parameters were stored, and has others in force now; "
+            "set and store them again"
+        )
 
 
 def _wait(
@@ -171,27 +186,34 @@ def _wait(
 
 
 def _ask(
-    link: BoardLink, send: Callable[[int], None], done: Callable[[], bool], what: str
+    link: BoardLink,
+    send: Callable[[int], None],
+    done: Callable[[], bool],
+    what: str,
+    reply_s: float = _REPLY_S,
 ) -> Procedure:
     """Send (with the count of tries so far) until `done`; RigFault after the last try."""
     for count in range(_TRIES):
         send(count)
-        if (yield from _wait(link, done, _REPLY_S)):
+        if (yield from _wait(link, done, reply_s)):
             return
     raise RigFault(
-        f"board: no answer to {what} within {_TRIES * _REPLY_S:.0f} s "
+        f"board: no answer to {what} within {_TRIES * reply_s:.0f} s "
         f"({link.loss_ratio:.0%} of its frames lost); check range and power"
     )
 
 
-def _command(link: BoardLink, what: str, command: int, *params: float) -> Procedure:
+def _command(
+    link: BoardLink, what: str, command: int, *params: float, reply_s: float = _REPLY_S
+) -> Procedure:
     start_s = link.t_s
     link.acks.pop(command, None)
     yield from _ask(
         link,
         lambda count: link.send_command(command, count, *params),
-        lambda: command in link.acks,
+        lambda: link.acks.get(command, _UNDER_WAY) != _UNDER_WAY,
         f"the command to {what}",
+        reply_s,
     )
     result = link.acks[command]
     if result != dialect.MAV_RESULT_ACCEPTED:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from hil.core.clocks import BoardClock
 from hil.core.errors import RigFault
-from hil.core.rig import ByteStream
+from hil.core.rig import ByteStream, discard_unsent
 from hil.core.types import WheelSample
 from hil.wire import dialect
 from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM, FrameReader, FrameWriter
@@ -171,11 +171,13 @@ class BoardLink:
     def stop_now(self, t_host_s: float) -> None:
         """Send an emergency stop three times without waiting; for the way out of a fault.
 
-        The board's own time-out stops the wheels should none arrive.
+        What the port still holds is forgotten, so that nothing goes before it. The board's own
+        time-out stops the wheels should none arrive.
         """
         self._procedure = None
         self.t_s = t_host_s
         try:
+            discard_unsent(self._stream)
             for count in range(3):
                 self.send_command(dialect.MAV_CMD_DO_FLIGHTTERMINATION, count, 1.0)
         except RigFault:
@@ -207,6 +209,7 @@ class BoardLink:
             if sent_s is not None:
                 rest_us = (wire.t_mcu_us - wire.t_setpoint_us) & 0xFFFF_FFFF
                 round_trip_s = t_s - sent_s - rest_us * 1e-6
+        self.clock.report(wire.t_mcu_us, t_s)
         t_board_s = self.clock.to_host_s(wire.t_mcu_us) if self.clock.ready else t_s
         sample = WheelSample(
             t_board_s,

@@ -12,6 +12,10 @@ constexpr double kAdcStep_v = 3.0 * 5.0 / 1024.0;
 // so that the ring can fill up here as it does on the board. Long enough for a frame in one piece.
 constexpr double kUartAhead_us = 20000.0;
 
+void read_bytes(void* storage, std::uint16_t address, std::uint8_t* out, std::uint16_t n) {
+  std::copy_n(static_cast<const std::uint8_t*>(storage) + address, n, out);
+}
+
 }  // namespace
 
 std::uint32_t HostBoard::clock_us(double t_us) const {
@@ -30,6 +34,7 @@ void HostBoard::set_reset(bool held, std::int64_t t_us, const std::uint8_t pins[
   edges_.clear();
   edges_done_ = 0;
   hil::board_init(board_);
+  hil::board_load(board_, read_bytes, eeprom_.data());
   for (int side = 0; side < 2; ++side) encoder_[side] = hil::Quadrature{pins[side], 0, 0};
 }
 
@@ -46,8 +51,11 @@ void HostBoard::catch_up(double t_us) {
     const Chunk& chunk = received_.front();
     const auto at_us = static_cast<double>(chunk.t_us);
     if (!held_) {
-      hil::board_receive(board_, reinterpret_cast<const std::uint8_t*>(chunk.bytes.data()),
-                         static_cast<std::uint16_t>(chunk.bytes.size()), clock_us(at_us));
+      const auto* bytes = reinterpret_cast<const std::uint8_t*>(chunk.bytes.data());
+      for (std::size_t at = 0; at < chunk.bytes.size();) {
+        const auto left = static_cast<std::uint16_t>(std::min<std::size_t>(chunk.bytes.size() - at, 0xFFFF));
+        at += hil::board_receive(board_, bytes + at, left, clock_us(at_us));
+      }
       transmit(at_us);
     }
     received_.pop_front();
@@ -76,6 +84,9 @@ void HostBoard::tick(double t_us, double battery_v) {
   inputs.encoder_faults = static_cast<std::uint16_t>(encoder_[0].illegal + encoder_[1].illegal);
   inputs.battery_mv = static_cast<std::uint16_t>(1000.0 * kAdcStep_v * std::floor(steps));
   hil::board_tick(board_, inputs, outputs_);
+  hil::StoredByte byte{};
+  if (hil::board_store(board_, byte)) eeprom_[byte.address] = byte.value;
+  hil::board_slack(board_);
   transmit(t_us);
 }
 

@@ -50,7 +50,8 @@ struct HostBoardOptions {
 
 class HostBoard final : public BoardSide {
  public:
-  explicit HostBoard(const HostBoardOptions& options) : options_(options) {}
+  explicit HostBoard(const HostBoardOptions& options)
+      : options_(options), eeprom_(hil::STORAGE_SIZE, 0xFF) {}
   void set_reset(bool held, std::int64_t t_us, const std::uint8_t pins[2]) override;
   void edge(const PinEdge& edge) override { edges_.push_back(edge); }
   void receive(std::int64_t t_us, std::string bytes) override;
@@ -70,6 +71,7 @@ class HostBoard final : public BoardSide {
   std::vector<PinEdge> edges_;
   std::size_t edges_done_ = 0;
   std::deque<Chunk> received_;
+  std::vector<std::uint8_t> eeprom_;  // as it comes new; keeps what it holds through a reset
   bool held_ = true;
   double boot_us_ = 0.0;            // true time at which the board's clock showed clock_boot_us_
   std::uint32_t clock_boot_us_ = 0;

@@ -1,14 +1,20 @@
 #include "plant.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace twin {
 namespace {
 
 constexpr double kGravity = 9.81;  // m/s^2
+// Slope of a brake's torque through rest, as stiff as a jam of the gears (kernel.cpp).
+constexpr double kStiffest_n_m_s_rad = 12.0;
 
 // Sign with a soft middle: 0.71 at v = v_s, 0.995 at 10 v_s.
 inline Pair soft_sign(Pair v, double v_s) { return v / root(v * v + v_s * v_s); }
+
+// Friction scaled by a change of it: there is none below -1, least of all one that drives.
+inline double grip(const LoadVector& load) { return std::max(1.0 + load[kFrictionChange], 0.0); }
 
 // x + h dx
 inline PairedState moved(const PairedState& x, double h, const PairedState& dx) {
@@ -76,12 +82,22 @@ double Plant::draw_a(Pair current_a, const Drive& drive) const {
 double Plant::battery_v(double charge_ratio, double draw_a, double sag_v) const {
   const double open_v =
       p_.battery_empty_v + (p_.battery_full_v - p_.battery_empty_v) * charge_ratio;
-  return open_v - p_.battery_resistance_ohm * draw_a - sag_v;
+  // A sag above what is there leaves nothing; it does not reverse the motors.
+  return std::max(open_v - p_.battery_resistance_ohm * draw_a - sag_v, 0.0);
+}
+
+// Torque of a brake: against the motion, with the soft middle of all friction here; softer for a strong
+// one, so that it is never stiffer than kStiffest.
+double Plant::brake(double torque_n_m, double omega_rad_s) const {
+  if (!(torque_n_m > 0.0)) return 0.0;
+  const double soft_rad_s =
+      std::max(p_.floor_smoothing_m_s * d_.per_radius, torque_n_m / kStiffest_n_m_s_rad);
+  return torque_n_m * omega_rad_s / std::hypot(omega_rad_s, soft_rad_s);
 }
 
 // Motor, bridge and gear of both sides (2.11).
-Plant::Sides Plant::sides(Pair current_a, Pair omega_rad_s, const Drive& drive, Pair load_n_m,
-                          double battery_v) const {
+Plant::Sides Plant::sides(Pair current_a, Pair omega_rad_s, const Drive& drive,
+                          const LoadVector& load, double battery_v) const {
   const Pair channel_a = p_.motor_per_side * current_a;
   const Pair drop_v = p_.bridge_drop_v * soft_sign(channel_a, p_.bridge_smoothing_a) +
                       p_.bridge_resistance_ohm * channel_a;
@@ -95,12 +111,15 @@ Plant::Sides Plant::sides(Pair current_a, Pair omega_rad_s, const Drive& drive, 
       (p_.motor_stiction_n_m - p_.motor_coulomb_n_m) / (1.0 + ratio * ratio) +
       (1.0 - p_.motor_gear_efficiency_ratio) * magnitude(gear_n_m);
   const Pair friction_n_m = sign * coulomb_n_m + p_.motor_viscous_n_m_s_rad * omega_rad_s;
+  const Pair brake_n_m = {brake(load[kBrakeLeft], omega_rad_s[0]),
+                          brake(load[kBrakeRight], omega_rad_s[1])};
   Sides out;
   out.current_dot =
       d_.per_inductance * (drive.duty * battery_v - drop_v - d_.emf_v_s * omega_rad_s -
                            p_.motor_resistance_ohm * current_a);
   out.torque_n_m =
-      p_.motor_per_side * (gear_n_m - friction_n_m) - drive.jam * omega_rad_s - load_n_m;
+      p_.motor_per_side * (gear_n_m - friction_n_m) - drive.jam * omega_rad_s -
+      Pair{load[kLoadLeft], load[kLoadRight]} - brake_n_m;
   out.rolling_sign = sign;
   return out;
 }
@@ -128,8 +147,7 @@ PairedState Plant::derivative(const PairedState& x, const Heading& at, const Dri
                               const LoadVector& load) const {
   const double drawn_a = draw_a(x[kCurrent], drive);
   const double supply_v = battery_v(x[kBattery][0], drawn_a, load[kBatterySag]);
-  const Sides both = sides(x[kCurrent], x[kOmega], drive, Pair{load[kLoadLeft], load[kLoadRight]},
-                           supply_v);
+  const Sides both = sides(x[kCurrent], x[kOmega], drive, load, supply_v);
   const double c = at.cos, s = at.sin;
   // Weight along the floor, body frame, small-angle floor (loads on the axles unchanged).
   const double gx = -kGravity * load[kSlopeX], gy = -kGravity * load[kSlopeY];
@@ -159,12 +177,11 @@ Plant::Acceleration Plant::constrained(const PairedState& x, const Sides& both,
                                        const LoadVector& load, const double* gravity) const {
   const double m = p_.mass_kg, half = 0.5 * p_.track_m, d0 = p_.d0_m;
   const double w = x[kTurn][1], eta1 = x[kEta][0], eta2 = x[kEta][1];
-  const double grip = 1.0 + load[kFrictionChange];
   const Pair rim_n =
-      both.torque_n_m * d_.per_radius - grip * d_.roll_n * both.rolling_sign;  // left, right
+      both.torque_n_m * d_.per_radius - grip(load) * d_.roll_n * both.rolling_sign;  // left, right
 
   const Pair axle_m = {p_.front_axle_m, -p_.rear_axle_m};
-  const Pair slide_n = grip * Pair{d_.slide_front_n, d_.slide_rear_n} *
+  const Pair slide_n = grip(load) * Pair{d_.slide_front_n, d_.slide_rear_n} *
                        soft_sign(eta2 + axle_m * w, p_.floor_smoothing_m_s);
   const double lateral_n = sum(slide_n);              // F_y
   const double scrub_n_m = sum(axle_m * slide_n);     // in M_r
@@ -191,10 +208,9 @@ Plant::Acceleration Plant::slipping(const PairedState& x, const Sides& both,
                                     const LoadVector& load, const double* gravity) const {
   const double m = p_.mass_kg, r = p_.wheel_radius_m, half = 0.5 * p_.track_m;
   const double w = x[kTurn][1], eta1 = x[kEta][0], eta2 = x[kEta][1];
-  const double grip = 1.0 + load[kFrictionChange];
   const double v_s = p_.floor_slip_smoothing_m_s;
   const double axle_x[2] = {p_.front_axle_m, -p_.rear_axle_m};
-  const double wheel_n[2] = {0.5 * grip * d_.slide_front_n, 0.5 * grip * d_.slide_rear_n};
+  const double wheel_n[2] = {0.5 * grip(load) * d_.slide_front_n, 0.5 * grip(load) * d_.slide_rear_n};
   const Pair y = {half, -half};
   const Pair slip_x = eta1 - y * w - r * x[kOmega];
   Pair drive_n = {0.0, 0.0}, side_n = {0.0, 0.0};
@@ -207,7 +223,7 @@ Plant::Acceleration Plant::slipping(const PairedState& x, const Sides& both,
     moment -= axle_x[axle] * sum(share) * slip_y;
   }
   moment -= sum(y * drive_n);
-  const Pair rim_n = grip * d_.roll_n * both.rolling_sign + drive_n;
+  const Pair rim_n = grip(load) * d_.roll_n * both.rolling_sign + drive_n;
   Acceleration acc;
   acc.omega_dot = (both.torque_n_m - r * rim_n) / d_.side_inertia;
   acc.eta1_dot =

@@ -60,8 +60,10 @@ using PairedState = std::array<Pair, kPairs>;
 
 // What acts on the robot from outside besides the bridge, with the scenario's name for it
 // (hil.config.events.Target). Accelerations add to eta1_dot, eta2_dot and theta_ddot; forces and
-// the torque act at the centre of mass in the body frame; wheel loads oppose forward when positive;
-// slopes raise the floor along world X and Y; the friction change is added to 1.
+// the torque act at the centre of mass in the body frame; a wheel load is a torque that pushes backward
+// when positive, also at rest; a brake opposes the wheel's motion whichever way (below 0 it is 0);
+// slopes raise the floor along world X and Y; the friction change is added to 1 (below 0 it is 0), and
+// the sag takes the battery down to 0 V at most.
 #define TWIN_LOADS(X)                       \
   X(kAccForward, "eta1_dot_m_s2")           \
   X(kAccLateral, "eta2_dot_m_s2")           \
@@ -71,6 +73,8 @@ using PairedState = std::array<Pair, kPairs>;
   X(kTorqueYaw, "torque_yaw_n_m")           \
   X(kLoadLeft, "load_left_n_m")             \
   X(kLoadRight, "load_right_n_m")           \
+  X(kBrakeLeft, "brake_left_n_m")           \
+  X(kBrakeRight, "brake_right_n_m")         \
   X(kSlopeX, "slope_x_rad")                 \
   X(kSlopeY, "slope_y_rad")                 \
   X(kFrictionChange, "friction_change_ratio") \
@@ -114,8 +118,8 @@ class Plant {
     double eta1_dot, eta2_dot, theta_ddot;  // m/s^2, m/s^2, rad/s^2, body frame
     Pair omega_dot;                         // rad/s^2
   };
-  TWIN_INLINE Sides sides(Pair current_a, Pair omega_rad_s, const Drive& drive, Pair load_n_m,
-                          double battery_v) const;
+  TWIN_INLINE Sides sides(Pair current_a, Pair omega_rad_s, const Drive& drive,
+                          const LoadVector& load, double battery_v) const;
   // Quotients that do not change, because a division costs as much as ten products.
   struct Derived {
     double per_radius, per_inductance, per_stribeck, per_charge;
@@ -136,6 +140,7 @@ class Plant {
   static Heading turned(const Heading& from, double by_rad);
   double battery_v(double charge_ratio, double draw_a, double sag_v) const;
   double draw_a(Pair current_a, const Drive& drive) const;  // from the battery
+  TWIN_INLINE double brake(double torque_n_m, double omega_rad_s) const;
   TWIN_INLINE PairedState derivative(const PairedState& x, const Heading& at, const Drive& drive,
                                      const LoadVector& load) const;
   TWIN_INLINE Acceleration constrained(const PairedState& x, const Sides& both,

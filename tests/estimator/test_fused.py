@@ -6,6 +6,7 @@ import time
 import pytest
 
 from hil.config.control import EstimatorConfig
+from hil.config.load import load_robot
 from hil.control.estimators.geometry import BelievedGeometry
 from hil.control.estimators.making import make_estimator
 from hil.core.errors import BadInput
@@ -208,6 +209,120 @@ def test_restarted_board_is_noticed():
     late = world.run(1.0, lambda _: (0.3, 0.0))
     assert position_errors(late)[-1] < 0.005
     assert estimator.gated_total == 0
+
+
+@pytest.mark.parametrize(("counts", "gap_s"), [(1000, 0.02), (5000, 0.3), (15_000, 0.5)])
+def test_a_restarted_counter_is_no_travel(counts, gap_s):
+    """A board that was reset counts from 0: no wheel turns back so far in that time."""
+    estimator = make_estimator("fused", CONFIG, TRUE)
+    estimator.on_pose(0.0, PoseMeasurement(Pose(0.0, 0.0, 0.0), 1.0))
+    for k in range(5):
+        estimator.on_wheels(WheelSample(0.01 + 0.02 * k, counts, counts, 0.0, 0.0))
+    estimator.on_wheels(WheelSample(0.09 + gap_s, 0, 0, 0.0, 0.0))
+    after = estimator.estimate_at(0.09 + gap_s)
+    assert abs(after.pose.x_m) < 1e-3
+    assert abs(after.eta1_m_s) < 0.01
+
+
+def test_the_fastest_motors_are_no_restart():
+    """At the no-load speed of the robot's motors every report counts, half a second apart or not."""
+    geometry = BelievedGeometry.of(load_robot("thesis-4wd"))
+    estimator = make_estimator("fused", CONFIG, geometry)
+    estimator.on_pose(0.0, PoseMeasurement(Pose(0.0, 0.0, 0.0), 1.0))
+    omega_rad_s = load_robot("thesis-4wd").no_load_rad_s
+    for t in (0.001, 0.021, 0.041, 0.541):
+        count = round(omega_rad_s * t / geometry.rad_per_count)
+        estimator.on_wheels(WheelSample(t, count, count, 0.0, 0.0))
+    travelled_m = omega_rad_s * 0.54 * geometry.wheel_radius_m
+    assert estimator.estimate_at(0.541).pose.x_m == pytest.approx(travelled_m, rel=0.01)
+
+
+def straight_after(turn_s):
+    """Turn on the spot for a while, then drive; the gap in the poses begins at 4 s."""
+    return lambda t: (0.0, 2.5) if 4.0 <= t < 4.0 + turn_s else (0.4, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("motion", "gap_s"),
+    [
+        (lambda t: (0.4, 2.5 if t < 4.33 else -2.5), 0.65),
+        (straight_after(0.33), 0.65),
+        (straight_after(0.15), 0.3),
+        (lambda _: (0.3, 2.0), 0.65),
+        (lambda t: (0.4 if t < 4.3 else -0.4, 2.0), 0.6),
+    ],
+)
+def test_the_first_pose_after_a_gap_makes_nothing_worse(motion, gap_s):
+    """Perfect wheels and poses: whatever was driven unseen, the pose is believed and changes little."""
+    geometry = BelievedGeometry(0.0482, 0.2166, 0.03, 2_000_000)
+    estimator = make_estimator("fused", EstimatorConfig(), geometry)
+    x = y = theta = left = right = 0.0
+    unit = geometry.rad_per_count
+    believed = []
+    for k in range(5000):
+        t = 0.001 * k
+        if k % 20 == 0:
+            sample = WheelSample(t, round(left / unit), round(right / unit), 0.0, 0.0)
+            estimator.on_wheels(sample)
+        if k % 33 == 7 and not 4.0 <= t < 4.0 + gap_s:
+            off = [math.dist(e.z1_m, (x, y)) for e in [estimator.estimate_at(t)] if e]
+            seen = Pose(
+                x - 0.03 * math.cos(theta),
+                y - 0.03 * math.sin(theta),
+                math.remainder(theta, math.tau),
+            )
+            believed.append(estimator.on_pose(t, PoseMeasurement(seen, 1.0, "", 6e-5, 7.4e-4)))
+            if t > 4.0:
+                after = math.dist(estimator.estimate_at(t).z1_m, (x, y))
+                assert after < max(off[0], 5e-5)
+        v, w = motion(t)
+        middle = theta + 0.0005 * w
+        x, y, theta = (
+            x + 0.001 * v * math.cos(middle),
+            y + 0.001 * v * math.sin(middle),
+            theta + 0.001 * w,
+        )
+        d_left, d_right = geometry.wheels(0.001 * v, 0.001 * w)
+        left, right = left + d_left, right + d_right
+    assert all(believed)
+    assert estimator.gated_total == 0
+    assert estimator.scales[0] == pytest.approx(1.0, abs=3e-3)
+
+
+@pytest.mark.parametrize("speed_m_s", [0.8, 1.5])
+def test_a_robot_that_slides_is_followed(speed_m_s):
+    """Carried off sideways faster than any two poses lie close: the estimate goes along with it."""
+    estimator, world = make(conditions=Conditions(exact=True))
+    world.run(3.0, lambda _: (0.1, 0.0))
+    start_s = world.t
+    apart = []
+
+    def slide(moment):
+        world.jump = (0.0, speed_m_s * (world.t - start_s), 0.0)
+        apart.append(
+            abs(
+                moment.estimate.pose.y_m
+                - (moment.y - 0.03 * math.sin(moment.theta))
+                - world.jump[1]
+            )
+        )
+
+    world.run(0.8, lambda _: (0.1, 0.0), slide)
+    # What is seen is 60 ms old, a frame 33 ms and a tick as much; without it 0.8 s times the speed.
+    assert max(apart[-8:]) < 0.14 * speed_m_s
+    assert estimator.agreement_age_s(world.t) > 0.7
+
+
+def test_poses_believed_are_told_from_those_refused():
+    """`on_pose` says so, and `refused` by how much the last one was off."""
+    estimator, world = make(conditions=Conditions(exact=True))
+    world.run(2.0, lambda _: (0.0, 0.0))
+    here = estimator.estimate_at(world.t).pose
+    assert not estimator.on_pose(world.t, PoseMeasurement(Pose(here.x_m + 0.3, here.y_m, 0.3), 1.0))
+    assert estimator.refused[:2] == pytest.approx((0.3, 0.0), abs=2e-3)
+    assert estimator.on_pose(world.t + 0.03, PoseMeasurement(here, 1.0))
+    assert estimator.agreement_age_s(world.t + 0.03) == 0.0
+    assert not estimator.on_pose(world.t, PoseMeasurement(here, 1.0))  # older than the last one
 
 
 def test_nothing_is_said_before_the_first_pose():

@@ -271,62 +271,6 @@ def test_a_law_changed_in_motion_does_not_jolt():
         bench.run(wheels, 400, setpoint=5.0)
 
 
-# ---- storage ----
-
-
-def stored() -> bytes:
-    """Return the image of a board whose K0 was set to 0.25."""
-    bench = BoardBench()
-    bench.set_param("ISM_K0", 0.25)
-    assert bench.command(dialect.MAV_CMD_PREFLIGHT_STORAGE, 1.0) == ACCEPTED
-    image = bench.board.store()
-    assert image is not None
-    assert bench.board.store() is None
-    return image
-
-
-def test_parameters_survive_storage():
-    """What was stored is in force after a restart, hash included."""
-    board = _firmware.Board()
-    assert board.load(stored()) == _firmware.ImageResult.LOADED
-    assert board.parameters["ISM_K0"] == 0.25
-    assert board.parameter_hash == identity.parameter_hash(board.parameters)
-
-
-def test_any_damage_to_the_image_leaves_the_defaults():
-    """Every single byte flipped, every truncation, a write cut off half-way: defaults, and a text."""
-    image = stored()
-    defaults = _firmware.Board().parameters
-    damaged = [image[:i] + bytes([image[i] ^ 0x10]) + image[i + 1 :] for i in range(len(image))]
-    damaged += [image[:n] for n in range(1, len(image), 7)]
-    damaged += [image[:n] + b"\xff" * (len(image) - n) for n in range(1, len(image), 7)]
-    for bad in damaged:
-        bench = BoardBench()
-        assert bench.board.load(bad) == _firmware.ImageResult.DAMAGED
-        assert bench.board.parameters == defaults
-    assert "stored parameters damaged, defaults in force" in bench.texts()
-
-
-def test_blank_storage_is_no_damage():
-    """A new EEPROM reads 0xFF throughout: defaults without a complaint."""
-    bench = BoardBench()
-    assert bench.board.load(b"\xff" * len(stored())) == _firmware.ImageResult.BLANK
-    assert bench.texts() == []
-
-
-def test_defaults_come_back_on_request_and_storage_waits_for_disarming():
-    """Storage commands while armed are refused with a text."""
-    bench = BoardBench()
-    bench.set_param("ISM_K0", 0.25)
-    assert bench.command(dialect.MAV_CMD_PREFLIGHT_STORAGE, 2.0) == ACCEPTED
-    assert bench.board.parameters == _firmware.Board().parameters
-    assert bench.board.parameter_hash == _firmware.parameter_hash({})
-    assert bench.arm() == ACCEPTED
-    assert bench.command(dialect.MAV_CMD_PREFLIGHT_STORAGE, 1.0) == REJECTED
-    assert bench.board.store() is None
-    assert "command refused: armed" in bench.texts()
-
-
 # ---- time, losses, texts ----
 
 

@@ -56,6 +56,23 @@ def test_interrupts_are_never_off_for_long(cost):
     assert 30 < cost.interrupts_off_cycles <= INTERRUPTS_OFF_CYCLES
 
 
+def test_no_frame_takes_longer_than_a_tick(cost):
+    """Its bytes' interrupts, parse, answer and the new tuning that may follow: below 4 ms each."""
+    assert min(cost.frames.us.values()) > 100
+    assert cost.frames.costliest_us <= MARGIN * 4000, cost.frames.us
+
+
+def test_a_tick_waits_for_one_frame_at_most(cost):
+    """Under floods at line rate a tick begins less than 1 ms late, and ends before the next is due."""
+    assert 0 < cost.frames.latest_us <= MARGIN * 1000
+    assert cost.frames.latest_us + cost.longest_tick_us <= 0.75 * 4000
+
+
+def test_a_flood_of_frames_makes_no_tick_late(cost):
+    """PARAM_SETs at line rate while armed, defaults ordered a hundred times a second: no overrun."""
+    assert (cost.frames.overruns, cost.frames.bad_frames) == (0, 0)
+
+
 def test_the_longest_tick_leaves_room(cost):
     """The board's own account of its longest tick, interrupts during it included."""
     assert 500 < cost.longest_tick_us < 0.6 * 4000

@@ -145,6 +145,52 @@ def test_stored_parameters_survive_power_down():
     assert not second.texts
 
 
+@pytest.mark.parametrize("after_s", [0.0, 0.3, 0.8])
+def test_stored_means_stored(after_s):
+    """The board is reset at any time behind the host's "stored": the new values are in force."""
+    drive = PilDrive(
+        faults=(Fault(kind="board_reset", start_s=after_s + 0.001, end_s=after_s + 0.01),)
+    )
+    for step in (
+        handshake.download_parameters(drive.link),
+        handshake.set_parameter(drive.link, "BATT_LOW", 10.5),
+        handshake.store(drive.link),
+    ):
+        handshake.finish(drive.link, drive.twin, step)
+    drive.twin.begin(drive.twin.now_s())
+    drive.wait(after_s + 0.3)
+    handshake.finish(drive.link, drive.twin, handshake.download_parameters(drive.link))
+    assert drive.link.parameters["BATT_LOW"] == 10.5
+    drive.wait(1.0)
+    assert not drive.texts
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.95])
+def test_a_reset_in_mid_save_keeps_the_parameters_before(share):
+    """A whole save, then one that a reset cuts short: the first one's values, a text, and no "stored"."""
+    begin_s = share * image_s()
+    drive = PilDrive(faults=(Fault(kind="board_reset", start_s=begin_s, end_s=begin_s + 0.01),))
+    saved(drive, value=0.1)
+    drive.wait(image_s() + 0.2)
+    handshake.finish(drive.link, drive.twin, handshake.set_parameter(drive.link, "PID_KP", 0.3))
+    drive.link.texts.clear()
+    drive.link.begin(handshake.store(drive.link))
+    drive.link.acks.clear()
+    while not drive.link.acks:
+        drive.wait(0.005)
+    drive.twin.begin(drive.twin.now_s())
+
+    def wait_for_the_end() -> None:
+        while drive.link.busy:
+            drive.wait(0.02)
+
+    with pytest.raises(RigFault, match="was reset before its parameters were stored"):
+        wait_for_the_end()
+    handshake.finish(drive.link, drive.twin, handshake.download_parameters(drive.link))
+    assert drive.link.parameters["PID_KP"] == pytest.approx(0.1)
+    assert "last save was cut short, the one before in force" in drive.texts
+
+
 def test_half_written_eeprom_leaves_the_defaults_and_says_so():
     """Power lost in the middle of a save: the checksum fails, defaults are in force, and it runs."""
     first = PilDrive()

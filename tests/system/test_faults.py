@@ -23,6 +23,8 @@ def faulty(kind: str, out: Path, side: str = "both", **kwargs: str) -> RunRecord
     [
         ("dead_encoder", "left", "STALL_LEFT"),
         ("dead_encoder", "right", "STALL_RIGHT"),
+        ("dead_channel_a", "right", "STALL_RIGHT"),
+        ("dead_channel_b", "left", "STALL_LEFT"),
         ("swapped_phases", "left", "RUNAWAY_LEFT"),
         ("swapped_phases", "right", "RUNAWAY_RIGHT"),
         ("motor_reversed", "left", "RUNAWAY_LEFT"),

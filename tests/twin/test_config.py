@@ -10,6 +10,7 @@ import pytest
 from pydantic import ValidationError
 
 from hil.config.events import Disturbance, Fault, FaultKind, Shape, Target
+from hil.config.link import LinkConfig
 from sim_twin import _native
 from sim_twin.setup import plant_params
 from tests.twin.rigs import robot
@@ -67,6 +68,14 @@ def test_scenario_and_kernel_know_the_same_events():
         ({"motor_inductance_h": 2e-4}, "inductance_h must be at least"),
         ({"variant": "flying"}, "variant"),
         ({"wheels": 3}, "wheels"),
+        (
+            {"variant": "slip", "wheel_inertia_kg_m2": 0.0, "motor_rotor_inertia_kg_m2": 0.0},
+            "wheel_inertia_kg_m2 and motor.rotor_inertia_kg_m2",
+        ),
+        (
+            {"variant": "lifted", "wheel_inertia_kg_m2": 1e-9, "motor_rotor_inertia_kg_m2": 0.0},
+            "wheel_inertia_kg_m2 and motor.rotor_inertia_kg_m2",
+        ),
     ],
 )
 def test_a_robot_that_cannot_be_is_refused(change, says):
@@ -83,3 +92,30 @@ def test_events_that_make_no_sense_are_refused():
         Disturbance(target="force_forward_n", shape="pulse", amplitude=1)
     with pytest.raises(ValidationError, match="has no side"):
         Fault(kind="board_reset", side="left")
+    for target, least in (("friction_change_ratio", -1), ("brake_left_n_m", 0)):
+        with pytest.raises(ValidationError, match=f"{target} must be at least {least}"):
+            Disturbance(target=target, shape="step", amplitude=-1.5)
+        Disturbance(target=target, shape="step", amplitude=least)
+        Disturbance(target=target, shape="noise", amplitude=-1.5)
+
+
+@pytest.mark.parametrize("loss_ratio", [0.05, 0.55, 0.8, 0.85, 0.9])
+def test_the_shortest_burst_that_is_named_is_taken(loss_ratio):
+    """The bound by hand and the figure that the refusal shows both hold."""
+    by_hand = {0.9: 9.0, 0.8: 4.0}.get(loss_ratio, 1.0 + loss_ratio / (1.0 - loss_ratio))
+    LinkConfig(loss_ratio=loss_ratio, loss_burst_chunks=by_hand)
+    if loss_ratio < 0.6:
+        return
+    with pytest.raises(ValidationError, match="at least") as refused:
+        LinkConfig(loss_ratio=loss_ratio, loss_burst_chunks=1.0)
+    shown = float(str(refused.value).split("at least ")[1].split()[0])
+    LinkConfig(loss_ratio=loss_ratio, loss_burst_chunks=shown)
+
+
+def test_the_least_inductance_that_is_named_is_taken():
+    """The figure of the refusal is rounded so that it holds."""
+    for resistance_ohm in (3.0, 5.3, 7.77):
+        with pytest.raises(ValidationError, match="at least") as refused:
+            robot(motor_resistance_ohm=resistance_ohm, motor_inductance_h=1.1e-4)
+        shown = float(str(refused.value).split("at least ")[1].split()[0])
+        robot(motor_resistance_ohm=resistance_ohm, motor_inductance_h=shown)

@@ -65,6 +65,22 @@ def test_noise_depends_on_both_seeds_and_on_nothing_else():
         assert abs(np.corrcoef(base, other)[0, 1]) < 0.1
 
 
+def test_noises_without_a_seed_are_independent():
+    """Two of one list differ, from each other and from every seeded one; one given seed is one signal."""
+    t = np.arange(0.0, 100.0, 0.01)
+
+    def drawn(place, seed=None, target="force_forward_n"):
+        item = Disturbance(target=target, shape="noise", amplitude=1.0, frequency_hz=5.0, seed=seed)
+        arguments = shape_arguments(item, 7 << 32, place)
+        return np.array([_native.disturbance_value(*arguments, x, 0.0, 0.0) for x in t])
+
+    first, second = drawn(0), drawn(1, target="torque_yaw_n_m")
+    for other in (second, drawn(0, seed=0), drawn(0, seed=1)):
+        assert abs(np.corrcoef(first, other)[0, 1]) < 0.15
+    assert np.array_equal(drawn(0, seed=1), drawn(1, seed=1))
+    assert np.array_equal(first, drawn(0))
+
+
 def test_zone_limits_a_disturbance_to_a_place():
     """Full inside, half on the edge, nothing (0.3 %) 5 cm outside."""
     fields = {

@@ -217,6 +217,55 @@ def test_friction_change_and_battery_sag_scale_what_they_name():
     assert rates(model, 1.0, 1.0)["current_left_a"] - less == pytest.approx(2.0 / 2.5e-3)
 
 
+@pytest.mark.parametrize("variant", ["constrained", "slip"])
+@pytest.mark.parametrize("change", [-1.0, -1.5, -1000.0])
+def test_friction_below_none_is_none(variant, change):
+    """Unpowered, the robot coasts as at -1: no friction drives it."""
+    coasting = {}
+    for value in (-1.0, change):
+        model = plant(robot(variant=variant, **UNPLUGGED))
+        moving(model, eta1_m_s=0.3)
+        model.run(5000, 1e-4, 0.0, 0.0, loads(friction_change_ratio=value))
+        coasting[value] = named(model.state)["eta1_m_s"]
+    assert coasting[change] == coasting[-1.0] <= 0.3
+
+
+def test_a_sag_beyond_the_battery_does_not_reverse_the_motors():
+    """20 V off a battery of 12 V leave none: at full duty the robot stands."""
+    model = plant(robot())
+    model.run(5000, 1e-4, 1.0, 1.0, loads(battery_sag_v=20.0))
+    assert abs(named(model.state)["eta1_m_s"]) < 1e-6
+
+
+@pytest.mark.parametrize("variant", ["constrained", "slip", "lifted"])
+@pytest.mark.parametrize("torque_n_m", [0.2, 1.0, 1000.0])
+def test_a_brake_moves_nothing_and_stops_what_moves(variant, torque_n_m):
+    """At rest it does nothing; forward or backward it slows the robot down, and to rest only."""
+    braked = loads(brake_left_n_m=torque_n_m, brake_right_n_m=torque_n_m)
+    model = plant(robot(variant=variant))
+    model.run(5000, 1e-4, 0.0, 0.0, braked)
+    assert abs(named(model.state)["omega_left_rad_s"]) < 1e-9
+    for duty in (0.5, -0.5):
+        model = plant(robot(variant=variant))
+        model.run(5000, 1e-4, duty, duty, NO_LOADS)
+        before = named(model.state)["omega_left_rad_s"]
+        assert before * duty > 1.0
+        free = rates(model)["omega_left_rad_s"]
+        assert (rates(model, load=braked)["omega_left_rad_s"] - free) * duty < 0.0
+        model.run(10000, 1e-4, 0.0, 0.0, braked)
+        assert abs(named(model.state)["omega_left_rad_s"]) < 0.05
+
+
+def test_a_load_drives_where_a_brake_does_not():
+    """The torque pushes a resting robot backward, as docs/twin.md says; a negative brake is none."""
+    driven = plant(robot())
+    driven.run(5000, 1e-4, 0.0, 0.0, loads(load_left_n_m=1.0, load_right_n_m=1.0))
+    assert named(driven.state)["eta1_m_s"] < -0.5
+    still = plant(robot())
+    still.run(5000, 1e-4, 0.0, 0.0, loads(brake_left_n_m=-1.0, brake_right_n_m=-1.0))
+    assert named(still.state)["eta1_m_s"] == 0.0
+
+
 def kinetic_j(s):
     """Kinetic energy of body, wheels and rotors."""
     body = MASS * (s["eta1_m_s"] ** 2 + s["eta2_m_s"] ** 2) + 0.024 * s["theta_dot_rad_s"] ** 2

@@ -37,6 +37,23 @@ def test_delay_from_mid_exposure_has_its_mean_and_deviation():
     assert max(delays) <= 0.090 + 1e-9
 
 
+@pytest.mark.parametrize(
+    ("latency_s", "jitter_s", "drop_ratio", "rate_hz"),
+    [
+        (0.1, 0.03, 0.1, 30.0),
+        (0.1, 0.05, 0.01, 30.0),
+        (0.2, 0.05, 0.3, 60.0),
+        (0.06, 0.01, 0.0, 60.0),
+    ],
+)
+def test_the_median_delay_is_the_one_configured(latency_s, jitter_s, drop_ratio, rate_hz):
+    """Also where jitter makes frames wait for each other: 104.4 ms came of 100 +- 30 before."""
+    fields = {"latency_s": latency_s, "latency_jitter_s": jitter_s, "drop_ratio": drop_ratio}
+    got = frames(20_000, rate_hz=rate_hz, exposure_s=0.003, **fields)
+    delays = [frame.arrival_s - 0.5 * (frame.start_s + frame.end_s) for frame in got]
+    assert statistics.median(delays) == pytest.approx(latency_s, abs=0.03 * jitter_s)
+
+
 def test_frames_keep_their_order_and_follow_their_exposure():
     """Jitter far above the period neither swaps frames nor delivers one before its end."""
     got = frames(2000, rate_hz=200.0, exposure_s=0.004, latency_s=0.01, latency_jitter_s=0.05)

@@ -4,6 +4,7 @@ import math
 from random import Random
 
 import numpy as np
+import pytest
 
 from hil.core.types import Pose
 from sim_twin.drawn_poses import DrawnPoses, load_localiser_error
@@ -28,9 +29,13 @@ def rendered_errors():
 
 def drawn_errors(frames):
     drawn = DrawnPoses(load_localiser_error(), DEFAULT, Random(1))
-    truth = Pose(0.1, -0.2, 0.3)
-    seen = [drawn.measure((truth.x_m, truth.y_m, truth.theta_rad)) for _ in range(frames)]
-    return np.array([errors(m.pose, truth) for m in seen if m.pose is not None])
+    rng = Random(2)  # at places all over the floor: part of the error stands with the place
+    truths = [
+        Pose(rng.uniform(-0.8, 0.8), rng.uniform(-0.6, 0.6), rng.uniform(-3.0, 3.0))
+        for _ in range(frames)
+    ]
+    seen = [(drawn.measure((t.x_m, t.y_m, t.theta_rad)), t) for t in truths]
+    return np.array([errors(m.pose, t) for m, t in seen if m.pose is not None])
 
 
 def test_drawn_poses_are_those_of_the_rendered_localiser():
@@ -50,3 +55,20 @@ def test_drawn_poses_are_those_of_the_rendered_localiser():
     inside = np.hypot(drawn[:, 0], drawn[:, 1]) < 6.0 * kept.sigma_xy_m
     assert abs(rms(drawn[inside, :2]) / kept.sigma_xy_m - 1.0) < 0.03
     assert math.isclose(rms(drawn[inside, 2]), kept.sigma_theta_rad, rel_tol=0.03)
+
+
+def test_half_of_the_error_stands_with_the_place():
+    """40 frames at each of 60 places: between places and from frame to frame some 40 um each."""
+    kept = load_localiser_error()
+    drawn, rng = DrawnPoses(kept, DEFAULT, Random(3)), Random(4)
+    biases, scatters = [], []
+    for _ in range(60):
+        truth = Pose(rng.uniform(-0.8, 0.8), rng.uniform(-0.6, 0.6), rng.uniform(-3.0, 3.0))
+        seen = [drawn.measure((truth.x_m, truth.y_m, truth.theta_rad)).pose for _ in range(40)]
+        off = np.array([errors(pose, truth) for pose in seen if pose is not None])
+        off = off[np.hypot(off[:, 0], off[:, 1]) < 1e-3]
+        biases.append(off.mean(axis=0))
+        scatters.append(off.var(axis=0))
+    total = np.array([kept.sigma_xy_m, kept.sigma_xy_m, kept.sigma_theta_rad])
+    assert np.sqrt((np.array(biases) ** 2).mean(axis=0)) / total == pytest.approx(0.71, abs=0.15)
+    assert np.sqrt(np.array(scatters).mean(axis=0)) / total == pytest.approx(0.71, abs=0.05)

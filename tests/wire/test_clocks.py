@@ -5,7 +5,10 @@ import random
 
 import pytest
 
+from hil.config.link import LinkConfig
 from hil.core.clocks import BoardClock, CameraClock
+from sim_twin.twin import HOST_START_S
+from tests.twin.rigs import Drive
 
 WRAP_US = 2**32
 
@@ -186,3 +189,109 @@ def test_the_camera_window_follows_a_drift():
         exposure_s = n / 30.0
         clock.arrival(exposure_s * (1 + 2e-4), exposure_s + 0.06)
     assert clock.to_host_s(exposure_s * (1 + 2e-4)) - exposure_s == pytest.approx(1e-3, abs=2e-4)
+
+
+def stepped(clock: CameraClock, step_s: float, frames: int = 90) -> list[float]:
+    """Run a camera whose clock steps after three seconds; return the errors of dated frames since."""
+    rng, errors_s = random.Random(4), []
+    for n in range(90 + frames):
+        exposure_s = n / 30.0
+        stamp_s = exposure_s + 1000.0 + (step_s if n >= 90 else 0.0)
+        if clock.arrival(stamp_s, exposure_s + 0.06 + rng.gauss(0.0, 0.01)) and n >= 90:
+            errors_s.append(clock.to_host_s(stamp_s) - exposure_s)
+    return errors_s
+
+
+@pytest.mark.parametrize("step_s", [0.1, 0.3, 1.0, 100.0, -0.1, -0.3, -1.0, -500.0])
+def test_a_step_of_the_cameras_clock_starts_a_new_tie(step_s):
+    """A handful of frames is refused, then they are dated right again; and the step is told."""
+    clock = CameraClock(latency_s=0.06)
+    errors_s = stepped(clock, step_s)
+    assert len(errors_s) >= 90 - 5
+    assert max(abs(e) for e in errors_s) < 0.03
+    assert clock.restarts == 1
+    assert clock.step_s == pytest.approx(step_s, abs=0.03)
+
+
+def test_two_steps_are_two():
+    """There and back again."""
+    clock = CameraClock(latency_s=0.06)
+    stepped(clock, 0.4)
+    errors_s = stepped(clock, 0.4)  # back by 0.4 s (and 6 s) first
+    assert clock.restarts == 3
+    assert max(abs(e) for e in errors_s) < 0.03
+
+
+@pytest.mark.parametrize("ahead_s", [0.2, 1.0, 10.0, 100.0, math.inf, math.nan])
+def test_one_stamp_that_no_delay_explains_is_refused(ahead_s):
+    """It is not dated, and it moves nothing."""
+    clock = CameraClock(latency_s=0.06)
+    camera_errors_s(clock, random.Random(2), 200)
+    now_s = 200 / 30.0
+    before_s = clock.to_host_s(1000.0)
+    assert not clock.arrival(now_s + 1000.0 + ahead_s, now_s + 0.06)
+    assert clock.to_host_s(1000.0) == before_s
+    assert clock.arrival(now_s + 1000.0 + 1 / 30, now_s + 1 / 30 + 0.06)
+    assert (clock.refused, clock.restarts) == (1, 0)
+
+
+def test_old_stamps_among_new_ones_are_no_step():
+    """Every third frame comes with a stamp of half a second ago: refused, each time."""
+    clock = CameraClock(latency_s=0.06)
+    taken = [
+        clock.arrival(1000.0 + n / 30 - (0.5 if n % 3 == 2 else 0.0), n / 30 + 0.06)
+        for n in range(300)
+    ]
+    assert clock.restarts == 0
+    assert taken.count(False) == 100
+
+
+def test_a_late_host_is_no_step():
+    """Frames held up together for 0.4 s, in order, date as before: the camera's clock is right."""
+    clock = CameraClock(latency_s=0.06)
+    for n in range(300):
+        exposure_s = n / 30.0
+        held_until_s = 5.4 if 5.0 <= exposure_s < 5.4 else 0.0
+        assert clock.arrival(1000.0 + exposure_s, max(exposure_s + 0.06, held_until_s))
+        assert clock.to_host_s(1000.0 + exposure_s) == pytest.approx(exposure_s, abs=1e-9)
+    assert clock.restarts == 0
+
+
+def ties(link: LinkConfig, seeds: int) -> tuple[float, float, float]:
+    """Return mean and rms error in s, and rms over `sigma_s`, of ties over the simulated link.
+
+    The board sends its reports over it too: answers wait behind them.
+    """
+    errors_s, scores = [], []
+    for seed in range(1, seeds + 1):
+        drive = Drive(link=link, seed=seed)
+        drive.arm()
+        drive.twin.begin(drive.twin.now_s())
+        drive.run(12.0, 6.0, 6.0)
+        now_s = drive.twin.now_s()
+        started_us = random.Random(f"{seed} kernel").randrange(2_000_000, 600_000_000)
+        shown_us = started_us + int((now_s - HOST_START_S) * 1e6 * 1.0002)
+        error_s = drive.link.clock.to_host_s(shown_us) - now_s
+        errors_s.append(error_s)
+        scores.append(error_s / drive.link.clock.sigma_s)
+
+    def rms(values: list[float]) -> float:
+        return math.sqrt(sum(v * v for v in values) / len(values))
+
+    return sum(errors_s) / len(errors_s), rms(errors_s), rms(scores)
+
+
+@pytest.mark.parametrize(
+    ("link", "mean_s", "rms_s"),
+    [
+        (LinkConfig(), 1.5e-3, 2.0e-3),
+        (LinkConfig(latency_jitter_s=0.0), 0.8e-3, 0.8e-3),
+        (LinkConfig(latency_s=0.05, latency_jitter_s=0.03), 6e-3, 7e-3),
+    ],
+)
+def test_the_tie_holds_beside_the_boards_own_traffic(link, mean_s, rms_s):
+    """The error is that which `sigma_s` claims, also where the radio jitters."""
+    mean, rms, score = ties(link, 8)
+    assert abs(mean) < mean_s
+    assert rms < rms_s
+    assert score < 1.6

@@ -6,6 +6,8 @@ import subprocess
 import sys
 import time
 
+import pytest
+
 HIL = [sys.executable, "-m", "hil"]
 
 
@@ -42,3 +44,57 @@ def test_a_scenario_runs_on_the_served_twin(tmp_path):
     assert server.returncode == 130
     assert "kept real time within" in said
     assert not port.is_symlink()
+
+
+def heard(folder, what, timeout_s=20.0):
+    """Wait until the record's events have `what`; return whether they came to."""
+    events, end_s = folder / "events.jsonl", time.monotonic() + timeout_s
+    while time.monotonic() < end_s:
+        if events.exists() and what in events.read_text():
+            return True
+        time.sleep(0.05)
+    return False
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_killed_politely_both_ends_leave_as_by_ctrl_c(tmp_path, number):
+    """A stall of the server does no harm; a signal to the run stops the robot; one to the server ends it."""
+    port, frames, folder = tmp_path / "board", tmp_path / "camera", tmp_path / "run"
+    serve = ["twin", "serve", "--camera", "pose", "--pty", str(port), "--frames", str(frames)]
+    server = subprocess.Popen([*HIL, *serve], stderr=subprocess.PIPE, text=True)
+    run = None
+    try:
+        end_s = time.monotonic() + 10.0
+        while not frames.exists() and time.monotonic() < end_s:
+            time.sleep(0.05)
+        second = subprocess.run([*HIL, *serve], capture_output=True, text=True, check=False)
+        run = subprocess.Popen(
+            [
+                *HIL, "run", "scenario-1", "--on", f"serial:{port}", "--camera", f"twin:{frames}",
+                "--set", "duration_s=40", "--out", str(folder),
+            ],
+            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        assert heard(folder, '"armed"')
+        time.sleep(1.0)
+        server.send_signal(signal.SIGSTOP)
+        time.sleep(0.3)
+        server.send_signal(signal.SIGCONT)
+        time.sleep(1.0)
+        run.send_signal(number)
+        _, run_said = run.communicate(timeout=20)
+    finally:
+        server.send_signal(number)
+        _, said = server.communicate(timeout=10)
+        if run is not None and run.poll() is None:
+            run.kill()
+    assert second.returncode == 2
+    assert f"in use by another `hil twin serve` (pid {server.pid})" in second.stderr
+    assert run.returncode == 130, run_said
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert manifest["outcome"] == "interrupted"
+    assert "stopped" in (folder / "events.jsonl").read_text()
+    assert server.returncode == 130
+    assert "s behind by now" in said
+    assert not port.is_symlink()
+    assert not frames.exists()

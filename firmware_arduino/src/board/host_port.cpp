@@ -13,7 +13,7 @@ constexpr uint32_t kSilence_us = 1000000UL;
 
 uart::Port g_host = uart::kBluetooth;
 uint32_t g_heard_us;
-uint16_t g_frames;
+uint32_t g_frames;
 
 uart::Port other(uart::Port port) { return port == uart::kUsb ? uart::kBluetooth : uart::kUsb; }
 
@@ -21,8 +21,7 @@ void receive(Board& board) {
   const uart::Span bytes = uart::received(g_host);
   if (bytes.size == 0) return;
   const uint32_t now_us = ticker::now_us();
-  board_receive(board, bytes.data, bytes.size, now_us);
-  uart::drop(g_host, bytes.size);
+  uart::drop(g_host, static_cast<uint8_t>(board_receive(board, bytes.data, bytes.size, now_us)));
   if (board.link.received == g_frames) return;
   g_frames = board.link.received;
   g_heard_us = now_us;

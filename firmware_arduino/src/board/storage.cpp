@@ -6,26 +6,19 @@ namespace hil {
 namespace storage {
 namespace {
 
-uint8_t g_image[IMAGE_SIZE];
-uint16_t g_next = IMAGE_SIZE;  // byte to write; IMAGE_SIZE: no save is running
+uint8_t* place(uint16_t address) { return reinterpret_cast<uint8_t*>(address); }
 
-uint8_t* address(uint16_t index) { return reinterpret_cast<uint8_t*>(index); }
+void read(void*, uint16_t address, uint8_t* out, uint16_t n) { eeprom_read_block(out, place(address), n); }
 
 }  // namespace
 
 void load(Board& board) {
-  eeprom_read_block(g_image, address(0), IMAGE_SIZE);
-  board_load(board, g_image, IMAGE_SIZE);
+  board_load(board, read, nullptr);
 }
 
 void tick(Board& board) {
-  if (g_next < IMAGE_SIZE) {
-    if (!eeprom_is_ready()) return;
-    eeprom_update_byte(address(g_next), g_image[g_next]);
-    ++g_next;
-  } else if (board_store(board, g_image)) {
-    g_next = 0;
-  }
+  StoredByte byte;
+  if (eeprom_is_ready() && board_store(board, byte)) eeprom_update_byte(place(byte.address), byte.value);
 }
 
 }  // namespace storage

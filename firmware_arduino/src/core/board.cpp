@@ -34,7 +34,7 @@ void first_tick(Board& b, const BoardInputs& in) {
 
 SafetyView sense(Board& b, const BoardInputs& in) {
   if (!b.ticked) first_tick(b, in);
-  if (in.t_us - b.inputs.t_us > LATE_US) ++b.overruns;
+  if (in.t_us - b.inputs.t_us > LATE_US) count_up(b.overruns);
   SafetyView view;
   for (uint8_t i = 0; i < SIDES; ++i) {
     const float asked = drives(b) ? b.setpoint.omega_rad_s[i] : 0.0f;
@@ -85,17 +85,18 @@ void board_init(Board& b) {
   b = Board{};
   link_init(b.link);
   params_defaults(b.params);
-  b.parameter_hash = params_hash(b.params);
+  b.default_hash = b.parameter_hash = params_hash(b.params);
   b.dialect_hash = dialect_hash();
   b.params_next = PARAM_COUNT;
   protocol_retune(b);
   safety_init(b.safety, 0);
 }
 
-void board_receive(Board& b, const uint8_t* bytes, uint16_t n, uint32_t t_us) {
+uint16_t board_receive(Board& b, const uint8_t* bytes, uint16_t n, uint32_t t_us) {
   for (uint16_t i = 0; i < n; ++i) {
-    if (link_take(b.link, bytes[i])) protocol_handle(b, t_us);
+    if (link_take(b.link, bytes[i]) && protocol_handle(b, t_us)) return static_cast<uint16_t>(i + 1);
   }
+  return n;
 }
 
 void board_tick(Board& b, const BoardInputs& in, BoardOutputs& out) {
@@ -108,21 +109,32 @@ void board_tick(Board& b, const BoardInputs& in, BoardOutputs& out) {
   report_tick(b);
 }
 
-uint16_t board_transmit(Board& b, uint8_t* out, uint16_t max) { return ring_take(b.link.tx, out, max); }
-
-ImageResult board_load(Board& b, const uint8_t* image, uint16_t n) {
-  const ImageResult result = params_decode(b.params, image, n);
-  b.parameter_hash = params_hash(b.params);
-  protocol_retune(b);
-  if (result == ImageResult::DAMAGED) say(b, Text::STORAGE_DAMAGED);
-  return result;
+void board_slack(Board& b) {
+  if (b.retune_wait > 0) --b.retune_wait;
+  if (b.retune_due && (b.retune_wait == 0 || !drives(b))) protocol_retune(b);
 }
 
-bool board_store(Board& b, uint8_t (&image)[IMAGE_SIZE]) {
-  if (!b.store_wanted) return false;
-  b.store_wanted = false;
-  params_encode(b.params, image);
-  return true;
+uint16_t board_transmit(Board& b, uint8_t* out, uint16_t max) { return ring_take(b.link.tx, out, max); }
+
+ImageResult board_load(Board& b, StorageRead read, void* storage) {
+  const Stored stored = save_load(b.save, b.params, read, storage);
+  b.parameter_hash = params_hash(b.params);
+  protocol_retune(b);
+  if (stored.result == ImageResult::DAMAGED) say(b, Text::STORAGE_DAMAGED);
+  if (stored.older) say(b, Text::STORAGE_OLD);
+  return stored.result;
+}
+
+bool board_store(Board& b, StoredByte& out) {
+  Save& s = b.save;
+  if (s.running) {
+    if (save_next(s, out)) return true;
+    save_end(s);
+    if (!s.wanted) protocol_acknowledge(b, MAV_CMD_PREFLIGHT_STORAGE, MAV_RESULT_ACCEPTED);
+  }
+  if (!s.wanted) return false;
+  save_begin(s, b.params);
+  return save_next(s, out);
 }
 
 }  // namespace hil

@@ -7,6 +7,7 @@
 #include "constants.h"
 #include "link.h"
 #include "params.h"
+#include "save.h"
 #include "safety.h"
 #include "wheel_loop.h"
 
@@ -33,6 +34,8 @@ struct Setpoint {
   bool any;       // one has come since arming
 };
 
+constexpr uint8_t TEXT_BYTES = 5;  // a bit per text of texts.def
+
 struct Board {
   Params params;
   uint32_t parameter_hash;
@@ -47,9 +50,12 @@ struct Board {
   bool ticked;             // a tick has been, so `inputs` and the encoder zero are real
   uint8_t slot;            // place in the one-second schedule of reports, in ticks
   uint8_t params_next;     // next parameter of a running list; PARAM_COUNT: none
-  uint32_t texts_waiting;  // a bit per text of texts.def
-  uint32_t texts_sent;     // in this second
-  bool store_wanted;
+  uint8_t texts_waiting[TEXT_BYTES];
+  uint8_t texts_sent[TEXT_BYTES];  // in this second
+  uint32_t default_hash;   // parameter hash of the defaults
+  Save save;
+  bool retune_due;         // parameters have changed and `tuning` and `limits` have not
+  uint8_t retune_wait;     // ticks until it may be worked out while armed
   uint16_t overruns;       // ticks that came more than half a period late
   uint16_t refused;        // set-points
   uint16_t load_permille;  // longest tick of the last second; set by the layer that can measure it
@@ -57,17 +63,23 @@ struct Board {
 
 // Defaults in force, disarmed, nothing queued.
 void board_init(Board& b);
-// Takes n bytes that had arrived by t_us.
-void board_receive(Board& b, const uint8_t* bytes, uint16_t n, uint32_t t_us);
+// Takes bytes that had arrived by t_us: n of them, or fewer when one ends a frame that is costly to act on,
+// so that a tick that is due need not wait for the next such frame. Returns how many.
+uint16_t board_receive(Board& b, const uint8_t* bytes, uint16_t n, uint32_t t_us);
 // One control period; call every TICK_US.
 void board_tick(Board& b, const BoardInputs& in, BoardOutputs& out);
+// What a tick leaves for later: parameters that have changed take effect. Call once behind every tick, when
+// its outputs are on the pins.
+void board_slack(Board& b);
 // Hands out up to `max` bytes for the serial port; returns how many.
 uint16_t board_transmit(Board& b, uint8_t* out, uint16_t max);
 
-// Parameters from storage: call after board_init. Anything unsound leaves the defaults and says so.
-ImageResult board_load(Board& b, const uint8_t* image, uint16_t n);
-// True once after the host asked for the parameters to be stored; `image` is then ready to be written.
-bool board_store(Board& b, uint8_t (&image)[IMAGE_SIZE]);
+// Parameters from storage: call after board_init. Where nothing is sound the defaults stay in force. What
+// is damaged is said.
+ImageResult board_load(Board& b, StorageRead read, void* storage);
+// To be called whenever the storage has finished the byte before: true when `out` is to be written now. The
+// host's order to store is acknowledged once the last one is in.
+bool board_store(Board& b, StoredByte& out);
 
 }  // namespace hil
 

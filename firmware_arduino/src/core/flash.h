@@ -8,9 +8,11 @@
 #include <avr/pgmspace.h>
 #define HIL_FLASH PROGMEM
 #define HIL_FLASH_COPY(to, from, n) memcpy_P((to), (from), (n))
+#define HIL_FLASH_STRNCMP(text, entry, n) strncmp_P((text), (entry), (n))
 #else
 #define HIL_FLASH
 #define HIL_FLASH_COPY(to, from, n) memcpy((to), (from), (n))
+#define HIL_FLASH_STRNCMP(text, entry, n) strncmp((text), (entry), (n))
 #endif
 
 namespace hil {

@@ -9,7 +9,7 @@ namespace {
 void count_frame(Link& link) {
   const uint8_t gap = static_cast<uint8_t>(link.rx.seq - link.next_seq);
   // A step back is another host or a late frame, not a loss.
-  if (link.heard && gap < 128) link.lost = static_cast<uint16_t>(link.lost + gap);
+  if (link.heard && gap < 128) link.lost += gap;
   link.heard = true;
   link.next_seq = static_cast<uint8_t>(link.rx.seq + 1u);
   ++link.received;
@@ -28,7 +28,7 @@ bool link_take(Link& link, uint8_t byte) {
     return true;
   }
   if (got == MAVLINK_FRAMING_BAD_CRC) {
-    ++link.bad;
+    count_up(link.bad);
     if (byte == MAVLINK_STX) {  // the frame was cut short and this is the next one
       link.status.parse_state = MAVLINK_PARSE_STATE_GOT_STX;
       link.rx.magic = byte;
@@ -36,7 +36,7 @@ bool link_take(Link& link, uint8_t byte) {
       mavlink_start_checksum(&link.rx);
     }
   }
-  if (link.status.buffer_overrun != overruns) ++link.bad;
+  if (link.status.buffer_overrun != overruns) count_up(link.bad);
   return false;
 }
 
@@ -44,7 +44,7 @@ void link_send(Link& link, const mavlink_message_t& message, uint8_t room) {
   uint8_t frame[MAVLINK_MAX_PACKET_LEN];
   const uint8_t n = static_cast<uint8_t>(mavlink_msg_to_send_buffer(frame, &message));
   if (ring_free(link.tx) < n + room) {
-    ++link.dropped;
+    count_up(link.dropped);
     return;
   }
   ring_put(link.tx, frame, n);

@@ -18,11 +18,16 @@ struct Link {
   Ring tx;
   bool heard;               // a frame has come in, so gaps in its sequence mean losses
   uint8_t next_seq;
-  uint16_t received;        // all counters wrap
-  uint16_t lost;
-  uint16_t bad;
+  uint32_t received;        // wraps after years
+  uint32_t lost;
+  uint16_t bad;             // these two stay at their largest value
   uint16_t dropped;
 };
+
+// Counts one more; a counter that is reported stays at its largest value and does not start again.
+inline void count_up(uint16_t& counter) {
+  if (counter != UINT16_MAX) ++counter;
+}
 
 void link_init(Link& link);
 // Takes one byte; true when link.rx holds a good frame.

@@ -10,9 +10,20 @@ namespace hil {
 
 namespace {
 
+// Register of the CRC-32 after a name, which zeros fill up to its length.
+template <uint16_t N>
+constexpr uint32_t after_name(uint32_t state, const char (&name)[N], uint8_t from = 0) {
+  return from == PARAM_NAME_LENGTH
+             ? state
+             : after_name(crc32_byte(state, static_cast<uint8_t>(from < N ? name[from] : 0)), name,
+                          static_cast<uint8_t>(from + 1));
+}
+
+#define HIL_SPEC(name, value, low, high, live) \
+  {name, value, low, high, live, ~after_name(0xFFFFFFFFu, name)},
 constexpr ParamSpec SPECS[PARAM_COUNT] HIL_FLASH = {
-#define PARAM(name, field, value, low, high, unit, doc) {name, value, low, high, 0},
-#define LIVE_PARAM(name, field, value, low, high, unit, doc) {name, value, low, high, 1},
+#define PARAM(name, field, value, low, high, unit, doc) HIL_SPEC(name, value, low, high, 0)
+#define LIVE_PARAM(name, field, value, low, high, unit, doc) HIL_SPEC(name, value, low, high, 1)
 #include "params.def"
 #undef LIVE_PARAM
 #undef PARAM
@@ -28,20 +39,18 @@ bool in_range(const ParamSpec& spec, float value) {
   return isfinite(value) && value >= spec.low && value <= spec.high;
 }
 
-uint32_t names_hash() {
-  uint32_t crc = 0;
-  for (uint8_t i = 0; i < PARAM_COUNT; ++i) {
-    crc = crc32(crc, param_spec(i).name, PARAM_NAME_LENGTH);
-  }
-  return crc;
+constexpr uint32_t after_names(uint32_t state, uint8_t from = 0) {
+  return from == PARAM_COUNT ? state : after_names(after_name(state, SPECS[from].name),
+                                                   static_cast<uint8_t>(from + 1));
 }
+constexpr uint32_t NAMES_HASH = ~after_names(0xFFFFFFFFu);
 
-void write_header(uint8_t* image) {
-  const uint32_t names = names_hash();
+void write_header(uint8_t* image, uint8_t serial) {
+  const uint32_t names = NAMES_HASH;
   image[0] = 'H';
   image[1] = 'L';
   image[2] = IMAGE_VERSION;
-  image[3] = PARAM_COUNT;
+  image[3] = serial;
   memcpy(image + 4, &names, 4);
 }
 
@@ -55,7 +64,7 @@ bool is_blank(const uint8_t* image, uint16_t n) {
 bool is_sound(const uint8_t* image, uint16_t n) {
   if (n != IMAGE_SIZE) return false;
   uint8_t header[8];
-  write_header(header);
+  write_header(header, image_serial(image));
   uint32_t crc;
   memcpy(&crc, image + IMAGE_SIZE - 4, 4);
   return memcmp(header, image, sizeof(header)) == 0 && crc == crc32(0, image, IMAGE_SIZE - 4);
@@ -67,7 +76,7 @@ ParamSpec param_spec(uint8_t index) { return flash_read(SPECS[index]); }
 
 uint8_t param_find(const char* name) {
   for (uint8_t i = 0; i < PARAM_COUNT; ++i) {
-    if (strncmp(param_spec(i).name, name, PARAM_NAME_LENGTH) == 0) return i;
+    if (HIL_FLASH_STRNCMP(name, SPECS[i].name, PARAM_NAME_LENGTH) == 0) return i;
   }
   return PARAM_COUNT;
 }
@@ -88,14 +97,19 @@ ParamResult param_set(Params& params, uint8_t index, float value, bool armed) {
   return ParamResult::SET;
 }
 
+bool param_is(const Params& params, uint8_t index, float value) {
+  const float asked = value + 0.0f;
+  const float present = param_get(params, index);
+  return memcmp(&asked, &present, 4) == 0;
+}
+
 void params_defaults(Params& params) {
-  for (uint8_t i = 0; i < PARAM_COUNT; ++i) put(params, i, param_spec(i).initial);
+  for (uint8_t i = 0; i < PARAM_COUNT; ++i) put(params, i, flash_read(SPECS[i].initial));
 }
 
 uint32_t param_hash_term(const Params& params, uint8_t index) {
-  const ParamSpec spec = param_spec(index);
   const float value = param_get(params, index);
-  return crc32(crc32(0, spec.name, PARAM_NAME_LENGTH), &value, 4);
+  return crc32(flash_read(SPECS[index].name_crc), &value, 4);
 }
 
 uint32_t params_hash(const Params& params) {
@@ -104,11 +118,9 @@ uint32_t params_hash(const Params& params) {
   return sum;
 }
 
-void params_encode(const Params& params, uint8_t (&image)[IMAGE_SIZE]) {
-  write_header(image);
+void params_encode(const Params& params, uint8_t serial, uint8_t (&image)[IMAGE_SIZE]) {
+  write_header(image, serial);
   memcpy(image + 8, &params, sizeof(Params));
-  const uint32_t crc = crc32(0, image, IMAGE_SIZE - 4);
-  memcpy(image + IMAGE_SIZE - 4, &crc, 4);
 }
 
 ImageResult params_decode(Params& params, const uint8_t* image, uint16_t n) {

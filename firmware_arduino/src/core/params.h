@@ -23,7 +23,8 @@ struct ParamSpec {
   float initial;
   float low;
   float high;
-  uint8_t live;  // 1: may change while armed
+  uint8_t live;       // 1: may change while armed
+  uint32_t name_crc;  // CRC-32 over `name`
 };
 
 enum class ParamResult : uint8_t { SET, UNKNOWN, NOT_FINITE, OUT_OF_RANGE, FIXED_WHILE_ARMED };
@@ -34,6 +35,8 @@ uint8_t param_find(const char* name);
 float param_get(const Params& params, uint8_t index);
 // Sets a value after every check; `params` is left alone unless the result is SET.
 ParamResult param_set(Params& params, uint8_t index, float value, bool armed);
+// True when the parameter has this value, to the bit (0 and -0 are one value here).
+bool param_is(const Params& params, uint8_t index, float value);
 void params_defaults(Params& params);
 
 // Sum modulo 2^32 over all parameters of CRC-32(name[16], value as float32 little-endian). Over values,
@@ -42,13 +45,16 @@ void params_defaults(Params& params);
 uint32_t params_hash(const Params& params);
 uint32_t param_hash_term(const Params& params, uint8_t index);
 
-// Storage image: 'H' 'L' version count, CRC-32 over all names, values, CRC-32 over all before it.
+// Storage image: 'H' 'L' version serial, CRC-32 over all names, values, CRC-32 over all before it. Of two
+// images the one with the newer serial counts, in circular order.
 constexpr uint8_t IMAGE_VERSION = 1;
 constexpr uint16_t IMAGE_SIZE = 8 + sizeof(Params) + 4;
 enum class ImageResult : uint8_t { LOADED, BLANK, DAMAGED };
-void params_encode(const Params& params, uint8_t (&image)[IMAGE_SIZE]);
+// Writes all but the CRC at the end, which whoever hands the bytes out works out as they go.
+void params_encode(const Params& params, uint8_t serial, uint8_t (&image)[IMAGE_SIZE]);
 // Takes the image whole or not at all: anything but LOADED leaves the defaults in `params`.
 ImageResult params_decode(Params& params, const uint8_t* image, uint16_t n);
+inline uint8_t image_serial(const uint8_t* image) { return image[3]; }
 
 }  // namespace hil
 

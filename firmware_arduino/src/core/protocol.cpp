@@ -14,13 +14,8 @@ bool is_for_us(uint8_t system, uint8_t component) {
          (component == 0 || component == BOARD_COMPONENT_ID);
 }
 
-void send_ack(Board& b, uint16_t command, uint8_t result) {
-  mavlink_command_ack_t m = {command, result};
-  mavlink_message_t message;
-  mavlink_msg_command_ack_encode_status(BOARD_SYSTEM_ID, BOARD_COMPONENT_ID, &b.link.status, &message,
-                                        &m);
-  link_send(b.link, message, WHEEL_STATE_ROOM);
-}
+// A retune while armed starts the wheel law anew, so there are ten a second at most.
+constexpr uint8_t RETUNE_TICKS = 25;
 
 uint8_t refuse(Board& b, Text why, uint8_t result) {
   say(b, why);
@@ -39,10 +34,15 @@ bool wheels_turn(const Board& b) {
          fabsf(b.wheel[RIGHT].omega_rad_s) > AT_REST_RAD_S;
 }
 
-// What speaks against arming; Text::COUNT when nothing does.
-Text bar_to_arming(const Board& b, const mavlink_command_long_t& m) {
+// Which hash of an arming is not the board's; Text::COUNT when both are.
+Text foreign_hash(const Board& b, const mavlink_command_long_t& m) {
   if (!carries(b.dialect_hash, m.param3, m.param4)) return Text::ARM_DIALECT;
-  if (!carries(b.parameter_hash, m.param5, m.param6)) return Text::ARM_PARAMETERS;
+  return carries(b.parameter_hash, m.param5, m.param6) ? Text::COUNT : Text::ARM_PARAMETERS;
+}
+
+// What of the board's state speaks against arming; Text::COUNT when nothing does.
+Text bar_to_arming(const Board& b) {
+  if (b.limits.edges_too_fast) return Text::ARM_EDGES;
   if (!b.ticked) return Text::ARM_NO_TICK;
   if (b.safety.battery_low) return Text::ARM_BATTERY;
   if (b.safety.encoder_fault) return Text::ARM_ENCODER;
@@ -51,8 +51,11 @@ Text bar_to_arming(const Board& b, const mavlink_command_long_t& m) {
 }
 
 uint8_t arm(Board& b, const mavlink_command_long_t& m, uint32_t t_us) {
+  const Text foreign = foreign_hash(b, m);
+  if (foreign != Text::COUNT) return refuse(b, foreign, MAV_RESULT_TEMPORARILY_REJECTED);
   if (b.safety.state == HIL_STATE_ARMED) return MAV_RESULT_ACCEPTED;  // a repeat: nothing restarts
-  const Text bar = bar_to_arming(b, m);
+  if (b.retune_due) protocol_retune(b);
+  const Text bar = bar_to_arming(b);
   if (bar != Text::COUNT) return refuse(b, bar, MAV_RESULT_TEMPORARILY_REJECTED);
   if (!safety_apply(b.safety, WANTS_ARM)) return MAV_RESULT_FAILED;
   b.setpoint = Setpoint{};
@@ -84,14 +87,13 @@ uint8_t on_storage(Board& b, const mavlink_command_long_t& m) {
     return refuse(b, Text::COMMAND_ARMED, MAV_RESULT_TEMPORARILY_REJECTED);
   }
   if (m.param1 == 1.0f) {
-    b.store_wanted = true;
-  } else if (m.param1 == 2.0f) {
-    params_defaults(b.params);
-    b.parameter_hash = params_hash(b.params);
-    protocol_retune(b);
-  } else {
-    return refuse(b, Text::COMMAND_VALUE, MAV_RESULT_DENIED);
+    b.save.wanted = true;
+    return MAV_RESULT_IN_PROGRESS;  // board_store() says when it is done
   }
+  if (m.param1 != 2.0f) return refuse(b, Text::COMMAND_VALUE, MAV_RESULT_DENIED);
+  params_defaults(b.params);
+  b.parameter_hash = b.default_hash;
+  b.retune_due = true;
   return MAV_RESULT_ACCEPTED;
 }
 
@@ -123,7 +125,7 @@ void on_command(Board& b, uint32_t t_us) {
   mavlink_msg_command_long_decode(&b.link.rx, &m);
   if (!is_for_us(m.target_system, m.target_component)) return;
   const uint8_t result = run_command(b, m, t_us);
-  send_ack(b, m.command, result);
+  protocol_acknowledge(b, m.command, result);
 }
 
 // What is wrong with a set-point; Text::COUNT when nothing is.
@@ -143,7 +145,7 @@ void on_setpoint(Board& b, uint32_t t_us) {
   mavlink_msg_wheel_setpoint_decode(&b.link.rx, &m);
   const Text flaw = setpoint_flaw(b, m);
   if (flaw != Text::COUNT) {
-    ++b.refused;
+    count_up(b.refused);
     say(b, flaw);
     return;
   }
@@ -169,6 +171,14 @@ Text text_for(ParamResult result) {
   }
 }
 
+void change_param(Board& b, uint8_t index, float value) {
+  const uint32_t before = param_hash_term(b.params, index);
+  const ParamResult result = param_set(b.params, index, value, b.safety.state == HIL_STATE_ARMED);
+  if (result != ParamResult::SET) return say(b, text_for(result));
+  b.parameter_hash += param_hash_term(b.params, index) - before;
+  b.retune_due = true;
+}
+
 void on_param_set(Board& b) {
   mavlink_param_set_t m;
   mavlink_msg_param_set_decode(&b.link.rx, &m);
@@ -177,16 +187,8 @@ void on_param_set(Board& b) {
   if (index == PARAM_COUNT) return say(b, Text::PARAM_UNKNOWN);
   if (m.param_type != MAV_PARAM_TYPE_REAL32) {
     say(b, Text::PARAM_TYPE);
-  } else {
-    const uint32_t before = param_hash_term(b.params, index);
-    const ParamResult result =
-        param_set(b.params, index, m.param_value, b.safety.state == HIL_STATE_ARMED);
-    if (result == ParamResult::SET) {
-      b.parameter_hash += param_hash_term(b.params, index) - before;
-      protocol_retune(b);
-    } else {
-      say(b, text_for(result));
-    }
+  } else if (!param_is(b.params, index, m.param_value)) {
+    change_param(b, index, m.param_value);
   }
   send_param(b, index);
 }
@@ -215,17 +217,27 @@ void protocol_retune(Board& b) {
   b.limits = safety_limits(b.params);
   wheel_retuned(b.wheel[LEFT]);
   wheel_retuned(b.wheel[RIGHT]);
+  b.retune_due = false;
+  b.retune_wait = RETUNE_TICKS;
 }
 
-void protocol_handle(Board& b, uint32_t t_us) {
+void protocol_acknowledge(Board& b, uint16_t command, uint8_t result) {
+  mavlink_command_ack_t m = {command, result};
+  mavlink_message_t message;
+  mavlink_msg_command_ack_encode_status(BOARD_SYSTEM_ID, BOARD_COMPONENT_ID, &b.link.status, &message,
+                                        &m);
+  link_send(b.link, message, WHEEL_STATE_ROOM);
+}
+
+bool protocol_handle(Board& b, uint32_t t_us) {
   switch (b.link.rx.msgid) {
-    case MAVLINK_MSG_ID_WHEEL_SETPOINT: return on_setpoint(b, t_us);
-    case MAVLINK_MSG_ID_COMMAND_LONG: return on_command(b, t_us);
-    case MAVLINK_MSG_ID_TIMESYNC: return on_timesync(b, t_us);
-    case MAVLINK_MSG_ID_PARAM_SET: return on_param_set(b);
-    case MAVLINK_MSG_ID_PARAM_REQUEST_READ: return on_param_read(b);
-    case MAVLINK_MSG_ID_PARAM_REQUEST_LIST: return on_param_list(b);
-    default: return;
+    case MAVLINK_MSG_ID_WHEEL_SETPOINT: on_setpoint(b, t_us); return false;
+    case MAVLINK_MSG_ID_TIMESYNC: on_timesync(b, t_us); return false;
+    case MAVLINK_MSG_ID_COMMAND_LONG: on_command(b, t_us); return true;
+    case MAVLINK_MSG_ID_PARAM_SET: on_param_set(b); return true;
+    case MAVLINK_MSG_ID_PARAM_REQUEST_READ: on_param_read(b); return true;
+    case MAVLINK_MSG_ID_PARAM_REQUEST_LIST: on_param_list(b); return false;
+    default: return false;
   }
 }
 

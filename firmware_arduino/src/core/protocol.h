@@ -8,10 +8,13 @@
 
 namespace hil {
 
-// Acts on the frame in b.link.rx, which arrived by t_us.
-void protocol_handle(Board& b, uint32_t t_us);
-// Makes parameters take effect after a change to b.params.
+// Acts on the frame in b.link.rx, which arrived by t_us. True when that was costly: a tick that is due comes
+// before the next frame.
+bool protocol_handle(Board& b, uint32_t t_us);
+// Makes the parameters take effect now.
 void protocol_retune(Board& b);
+// Answers a command.
+void protocol_acknowledge(Board& b, uint16_t command, uint8_t result);
 
 }  // namespace hil
 

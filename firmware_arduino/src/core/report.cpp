@@ -29,7 +29,7 @@ constexpr TextEntry TEXTS[] HIL_FLASH = {
 #undef TEXT
 };
 
-static_assert(static_cast<uint8_t>(Text::COUNT) <= 32, "one bit per text");
+static_assert(static_cast<uint8_t>(Text::COUNT) <= 8 * TEXT_BYTES, "one bit per text");
 static_assert(sizeof(HIL_BUILD_ID) <= 9, "eight characters of build id");
 
 // Packs a message of the dialect and queues it behind room for a wheel state.
@@ -78,11 +78,18 @@ void send_wheel_state(Board& b) {
   link_send(b.link, message, 0);
 }
 
+uint8_t bit_of(uint8_t index) { return static_cast<uint8_t>(1u << (index & 7u)); }
+
+bool has_bit(const uint8_t (&set)[TEXT_BYTES], uint8_t index) {
+  return (set[index >> 3] & bit_of(index)) != 0;
+}
+
 void send_text(Board& b) {
-  if (b.texts_waiting == 0) return;
   uint8_t index = 0;
-  while ((b.texts_waiting & (uint32_t{1} << index)) == 0) ++index;
-  b.texts_waiting &= ~(uint32_t{1} << index);
+  while (!has_bit(b.texts_waiting, index)) {
+    if (++index == static_cast<uint8_t>(Text::COUNT)) return;
+  }
+  b.texts_waiting[index >> 3] &= static_cast<uint8_t>(~bit_of(index));
   const TextEntry entry = flash_read(TEXTS[index]);
   mavlink_statustext_t m;
   memset(&m, 0, sizeof(m));
@@ -98,17 +105,24 @@ uint8_t system_status(const Board& b) {
 
 // Share of the host's frames lost on the way, in hundredths of a percent.
 uint16_t loss_share(const Link& link) {
-  const uint32_t all = static_cast<uint32_t>(link.lost) + link.received;
-  return all == 0 ? 0 : static_cast<uint16_t>(10000u * static_cast<uint32_t>(link.lost) / all);
+  uint32_t lost = link.lost;
+  uint32_t all = lost + link.received;
+  if (all == 0) return 0;
+  for (; lost > UINT32_MAX / 10000u; lost >>= 1) all >>= 1;  // the product fits; a share needs no more
+  return static_cast<uint16_t>(10000u * lost / all);
+}
+
+uint16_t in_16_bits(uint32_t count) {
+  return count < UINT16_MAX ? static_cast<uint16_t>(count) : UINT16_MAX;
 }
 
 }  // namespace
 
 void say(Board& b, Text text) {
-  const uint32_t bit = uint32_t{1} << static_cast<uint8_t>(text);
-  if ((b.texts_sent & bit) != 0) return;
-  b.texts_sent |= bit;
-  b.texts_waiting |= bit;
+  const uint8_t index = static_cast<uint8_t>(text);
+  if (has_bit(b.texts_sent, index)) return;
+  b.texts_sent[index >> 3] |= bit_of(index);
+  b.texts_waiting[index >> 3] |= bit_of(index);
 }
 
 void say_state(Board& b) {
@@ -150,7 +164,7 @@ void send_sys_status(Board& b) {
   m.drop_rate_comm = loss_share(b.link);
   m.errors_comm = b.link.bad;
   m.errors_count1 = b.overruns;
-  m.errors_count2 = b.link.lost;
+  m.errors_count2 = in_16_bits(b.link.lost);
   m.errors_count3 = b.link.dropped;
   m.errors_count4 = b.refused;
   HIL_SEND(b, sys_status, m);
@@ -184,7 +198,7 @@ void report_tick(Board& b) {
   if (slot % PARAM_EVERY == 1 && b.params_next < PARAM_COUNT) send_param(b, b.params_next++);
   if (slot % TEXT_EVERY == 2) send_text(b);
   if (slot == 3) send_heartbeat(b);
-  if (slot == 4) b.texts_sent = b.texts_waiting;
+  if (slot == 4) memcpy(b.texts_sent, b.texts_waiting, TEXT_BYTES);
   if (slot == 8) send_sys_status(b);
 }
 

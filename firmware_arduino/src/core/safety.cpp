@@ -21,6 +21,7 @@ constexpr SafetyRule RULES[] = {
 
 constexpr uint8_t WINDOW_TICKS = 250;  // one second
 constexpr float TICKS_PER_MS = 1000.0f / TICK_US;
+constexpr float TWO_PI_RAD = 6.2831853f;
 
 // Counts ticks in a row; true once `limit` is reached.
 bool lasts(uint16_t& ticks, bool holds, uint16_t limit) {
@@ -32,21 +33,55 @@ bool lasts(uint16_t& ticks, bool holds, uint16_t limit) {
   return holds && ticks >= limit;
 }
 
+void fade(Tally& t) {
+  if (t.remembered == 0 || (++t.fade & 7u) != 0) return;
+  --t.remembered;
+}
+
+// As lasts(); besides, times of at least `worth` ticks add up.
+bool adds_up(Tally& t, bool holds, uint16_t limit, uint16_t worth) {
+  if (!holds) {
+    if (t.ticks >= worth) t.remembered = static_cast<uint16_t>(t.remembered + t.ticks);
+    t.ticks = 0;
+    return false;
+  }
+  if (t.ticks < limit) ++t.ticks;
+  const bool again = t.ticks >= worth && t.ticks + t.remembered >= limit;
+  if (t.ticks < limit && !again) return false;
+  t.remembered = 0;
+  return true;
+}
+
 bool against(const SideView& v) { return (v.pwm > 0) == (v.moved_counts < 0); }
 
-// A wheel with counts neither way keeps its tally: at a crawl most ticks see no count.
-bool runs_away(uint16_t& ticks, const SideView& v, const SafetyLimits& limits) {
+// A wheel with counts neither way keeps its tally: at a crawl most ticks see no count. A sound wheel that is
+// reversed runs against its duty for 40 ms.
+bool runs_away(Tally& t, const SideView& v, const SafetyLimits& limits) {
   const bool pushed = v.pwm >= limits.runaway_pwm || v.pwm <= -limits.runaway_pwm;
+  fade(t);
   if (pushed && v.moved_counts == 0) return false;
   const bool lost = pushed && against(v) &&
                     fabsf(v.omega_rad_s - v.setpoint_rad_s) >= limits.runaway_error_rad_s;
-  return lasts(ticks, lost, limits.runaway_ticks);
+  return adds_up(t, lost, limits.runaway_ticks, limits.runaway_ticks / 3);
 }
 
-bool stalls(uint16_t& ticks, const SideView& v, const SafetyLimits& limits) {
+// Whether the wheel has got on by two counts, either way, since it last did.
+bool gets_on(int16_t& net_counts, int16_t moved_counts) {
+  constexpr int16_t FLICKER_COUNTS = 1;
+  if (moved_counts > FLICKER_COUNTS || moved_counts < -FLICKER_COUNTS) return true;
+  net_counts = static_cast<int16_t>(net_counts + moved_counts);
+  return net_counts > FLICKER_COUNTS || net_counts < -FLICKER_COUNTS;
+}
+
+bool stalls(Tally& t, int16_t& net_counts, const SideView& v, const SafetyLimits& limits) {
   const bool pushed = v.pwm >= limits.stall_pwm || v.pwm <= -limits.stall_pwm;
   const bool asked = fabsf(v.setpoint_rad_s) >= limits.stall_setpoint_rad_s;
-  return lasts(ticks, (pushed || asked) && v.moved_counts == 0, limits.stall_ticks);
+  const bool on = gets_on(net_counts, v.moved_counts);
+  const bool driven = pushed || asked;
+  fade(t);
+  if (on || !driven) net_counts = 0;
+  if (!on && !driven) t.ticks = 0;  // nobody asks: that says nothing about the encoder
+  return adds_up(t, driven && !on, limits.stall_ticks, limits.pause_ticks);
 }
 
 void check_battery(Safety& s, const SafetyLimits& limits, uint16_t battery_mv) {
@@ -67,6 +102,14 @@ void check_encoder(Safety& s, const SafetyLimits& limits, uint16_t illegal_total
     s.illegal_at_window = illegal_total;
     s.window_ticks = 0;
   }
+}
+
+// A pause of a sound wheel between two counts, and the start of one against friction, are shorter than this.
+float pause_ticks(const Params& p) {
+  constexpr float START_TICKS = 25.0f;
+  constexpr float CRAWL_RAD_S = 0.5f;
+  const float two_counts = 2.0f * TWO_PI_RAD / (p.enc_counts_per_turn * CRAWL_RAD_S * TICK_S);
+  return fmaxf(fmaxf(START_TICKS, two_counts), 0.25f * p.stall_ms * TICKS_PER_MS);
 }
 
 uint16_t ticks_of(float ms) { return static_cast<uint16_t>(ms * TICKS_PER_MS + 0.5f); }
@@ -95,6 +138,7 @@ SafetyLimits safety_limits(const Params& p) {
       ? static_cast<uint16_t>((p.battery_low_v + p.battery_hysteresis_v) * 1000.0f + 0.5f) : 0;
   l.battery_ticks = ticks_of(p.battery_debounce_ms);
   l.stall_ticks = ticks_of(p.stall_ms);
+  l.pause_ticks = static_cast<uint16_t>(pause_ticks(p));
   l.runaway_ticks = ticks_of(p.runaway_ms);
   l.overspeed_ticks = ticks_of(p.overspeed_ms);
   l.stall_pwm = static_cast<int16_t>(p.stall_duty * PWM_TOP);
@@ -103,6 +147,7 @@ SafetyLimits safety_limits(const Params& p) {
   l.runaway_error_rad_s = p.runaway_error_rad_s;
   l.overspeed_rad_s = p.overspeed_rad_s;
   l.illegal_per_s = static_cast<uint16_t>(p.illegal_per_s);
+  l.edges_too_fast = p.enc_counts_per_turn * p.overspeed_rad_s > ENCODER_COUNTS_1_S * TWO_PI_RAD;
   return l;
 }
 
@@ -117,11 +162,11 @@ Conditions safety_check(Safety& s, const SafetyLimits& limits, const SafetyView&
   for (uint8_t i = 0; i < SIDES; ++i) {
     const SideView& side = view.side[i];
     const bool fast = fabsf(side.omega_rad_s) > limits.overspeed_rad_s;
-    if (runs_away(s.runaway_ticks[i], side, limits)) now |= condition(HIL_REASON_RUNAWAY_LEFT + i);
+    if (runs_away(s.runaway[i], side, limits)) now |= condition(HIL_REASON_RUNAWAY_LEFT + i);
     if (lasts(s.overspeed_ticks[i], fast, limits.overspeed_ticks)) {
       now |= condition(HIL_REASON_OVERSPEED_LEFT + i);
     }
-    if (stalls(s.stall_ticks[i], side, limits)) now |= condition(HIL_REASON_STALL_LEFT + i);
+    if (stalls(s.stall[i], s.net_counts[i], side, limits)) now |= condition(HIL_REASON_STALL_LEFT + i);
   }
   check_encoder(s, limits, view.illegal_total);
   check_battery(s, limits, view.battery_mv);

@@ -32,11 +32,13 @@ struct SafetyLimits {
   uint32_t setpoint_age_us;  // beyond this the time-out would pass before the next tick
   uint16_t battery_low_mv, battery_good_mv, battery_ticks;
   uint16_t stall_ticks, runaway_ticks, overspeed_ticks;
+  uint16_t pause_ticks;      // from here on a wheel that stood while it was driven is remembered
   int16_t stall_pwm, runaway_pwm;
   float stall_setpoint_rad_s;
   float runaway_error_rad_s;
   float overspeed_rad_s;
   uint16_t illegal_per_s;
+  bool edges_too_fast;       // at OVER_W more counts a tick than the encoder's tally holds
 };
 SafetyLimits safety_limits(const Params& params);
 
@@ -49,6 +51,14 @@ struct SideView {
   float omega_rad_s;
 };
 
+// How long something has held, and what is remembered of earlier times: that fades at an eighth of the rate,
+// so that a loose contact adds up.
+struct Tally {
+  uint16_t ticks;
+  uint16_t remembered;
+  uint8_t fade;
+};
+
 struct SafetyView {
   SideView side[SIDES];
   uint16_t illegal_total;
@@ -59,8 +69,11 @@ struct SafetyView {
 struct Safety {
   uint8_t state;
   uint8_t reason;
-  uint16_t stall_ticks[SIDES];
-  uint16_t runaway_ticks[SIDES];
+  // Since the wheel last got on, that is by two counts: one live channel of a broken encoder flickers by one
+  // and never gets further.
+  int16_t net_counts[SIDES];
+  Tally stall[SIDES];
+  Tally runaway[SIDES];
   uint16_t overspeed_ticks[SIDES];
   uint16_t battery_ticks;
   bool battery_low;

@@ -30,7 +30,12 @@ class Geometry:
     """The robot as the host believes it to be (hil.control.estimators.BelievedGeometry)."""
 
     def __init__(
-        self, wheel_radius_m: float, track_width_m: float, d0_m: float, rad_per_count: float
+        self,
+        wheel_radius_m: float,
+        track_width_m: float,
+        d0_m: float,
+        rad_per_count: float,
+        omega_max_rad_s: float = 40.0,
     ) -> None: ...
     def body(self, left: float, right: float) -> tuple[float, float]:
         """Return (forward, turn) of a pair of wheel angles or speeds: m and rad, or per s."""
@@ -119,14 +124,27 @@ class Fused:
         theta_rad: float,
         sigma_xy_m: float,
         sigma_theta_rad: float,
-    ) -> None:
-        """Take the pose seen at `t_exposure_s` in the past; older than the last one is dropped."""
+    ) -> bool:
+        """Take the pose seen at `t_exposure_s` in the past; older than the last one is dropped.
+
+        Return whether it was believed.
+        """
 
     def state_at(self, t_host_s: float) -> State | None:
         """Return the state at `t_host_s`, past the last exposure; None before the first pose."""
 
     def pose_age_s(self, t_host_s: float) -> float:
-        """Return the time since the last exposure that was believed; inf before the first."""
+        """Return the time since the last exposure that was believed; inf before the first.
+
+        Believed: passed the gate, or ended a run of refused poses that agree with each other.
+        """
+
+    def agreement_age_s(self, t_host_s: float) -> float:
+        """Return the time since a pose last agreed with the wheels (passed the gate); inf before."""
+
+    @property
+    def refused(self) -> tuple[float, float, float]:
+        """The last pose refused minus the pose expected then (m, m, rad); zero before the first."""
 
     @property
     def covariance(self) -> Matrix:

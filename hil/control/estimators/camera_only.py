@@ -48,17 +48,34 @@ class CameraOnly:
         """Return the time since the last exposure; inf before the first."""
         return math.inf if self._t is None else t_host_s - self._t
 
+    def agreement_age_s(self, t_host_s: float) -> float:
+        """Return the same: without wheels every pose is believed."""
+        return self.pose_age_s(t_host_s)
+
+    @property
+    def refused(self) -> tuple[float, float, float]:
+        """The last pose refused minus the pose expected then: none ever is."""
+        return 0.0, 0.0, 0.0
+
+    @property
+    def scales(self) -> tuple[float, float]:
+        """What the camera sees of what the wheels turn: not asked here."""
+        return 1.0, 1.0
+
     def on_wheels(self, sample: WheelSample) -> None:
         """Ignore the report: this variant sees with the camera alone."""
 
     def on_command(self, t_effect_s: float, eta1_m_s: float, theta_dot_rad_s: float) -> None:
         """Ignore the command: this variant sees with the camera alone."""
 
-    def on_pose(self, t_exposure_s: float, measurement: PoseMeasurement) -> None:
-        """Take the pose seen at `t_exposure_s`; older than the last one is dropped."""
+    def on_pose(self, t_exposure_s: float, measurement: PoseMeasurement) -> bool:
+        """Take the pose seen at `t_exposure_s`; older than the last one is dropped.
+
+        Return whether it was taken.
+        """
         pose = measurement.pose
         if pose is None or (self._t is not None and t_exposure_s <= self._t):
-            return
+            return False
         if self._t is None or t_exposure_s - self._t > _GAP_S:
             self._make_differentiators()
             dt = 0.0
@@ -70,6 +87,7 @@ class CameraOnly:
         (vx, ax), (vy, ay) = (st.step(v, dt) for st, v in zip(self._second, (vx, vy), strict=True))
         self._theta, self._theta_dot = self._turn.step(theta, dt)
         self._t, self._z1, self._z2, self._z3 = t_exposure_s, (x, y), (vx, vy), (ax, ay)
+        return True
 
     def estimate_at(self, t_host_s: float) -> Estimate | None:
         """Return the state carried on linearly to `t_host_s`; None before the first pose."""

@@ -32,7 +32,11 @@ class Fused(_fused.Fused):
 
     def __init__(self, config: EstimatorConfig, geometry: BelievedGeometry) -> None:
         believed = _fused.Geometry(
-            geometry.wheel_radius_m, geometry.track_width_m, geometry.d0_m, geometry.rad_per_count
+            geometry.wheel_radius_m,
+            geometry.track_width_m,
+            geometry.d0_m,
+            geometry.rad_per_count,
+            geometry.omega_max_rad_s,
         )
         super().__init__(assumptions(config), believed)
         self._wheels = geometry.wheels
@@ -46,18 +50,21 @@ class Fused(_fused.Fused):
         """Take one wheel report (in time order; a stale one is dropped)."""
         self.take_wheels(sample.t_host_s, sample.counts_left, sample.counts_right)
 
-    def on_pose(self, t_exposure_s: float, measurement: PoseMeasurement) -> None:
-        """Take the pose seen at `t_exposure_s` in the past; older than the last one is dropped."""
+    def on_pose(self, t_exposure_s: float, measurement: PoseMeasurement) -> bool:
+        """Take the pose seen at `t_exposure_s` in the past; older than the last one is dropped.
+
+        Return whether it was believed: it passed the gate, or ended a run of refused ones that
+        agree with each other (the robot was moved, or slides).
+        """
         pose = measurement.pose
-        if pose is not None:
-            self.take_pose(
-                t_exposure_s,
-                pose.x_m,
-                pose.y_m,
-                pose.theta_rad,
-                measurement.sigma_xy_m,
-                measurement.sigma_theta_rad,
-            )
+        return pose is not None and self.take_pose(
+            t_exposure_s,
+            pose.x_m,
+            pose.y_m,
+            pose.theta_rad,
+            measurement.sigma_xy_m,
+            measurement.sigma_theta_rad,
+        )
 
     def estimate_at(self, t_host_s: float) -> Estimate | None:
         """Return the state at `t_host_s`, past the last exposure; None before the first pose.

@@ -7,6 +7,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hil.config.robot import RobotConfig
+
+# The file may be off by a fifth, and a robot pushed or on a slope drives its motors.
+_OVER_NO_LOAD_RATIO = 1.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,6 +24,19 @@ class BelievedGeometry:
     track_width_m: float
     d0_m: float
     counts_per_turn: int
+    # No wheel turns faster; the default is that of the thesis's robot.
+    omega_max_rad_s: float = 40.0
+
+    @classmethod
+    def of(cls, robot: RobotConfig) -> BelievedGeometry:
+        """Return what the robot's file says."""
+        return cls(
+            robot.wheel_radius_m,
+            robot.track_m,
+            robot.d0_m,
+            robot.encoder_counts_per_turn,
+            _OVER_NO_LOAD_RATIO * robot.no_load_rad_s,
+        )
 
     @property
     def rad_per_count(self) -> float:

@@ -107,6 +107,7 @@ void Chip::attach() {
     for (int i = 0; i < 2; ++i) {
       avr_->io[AVR_DATA_TO_IO(compare[i])].w = {&compare_[side][i], write_compare};
     }
+    avr_->io[AVR_DATA_TO_IO(kBridge[side].icr)].w = {&top_[side], write_top};
   }
 }
 
@@ -129,6 +130,7 @@ void Chip::reset(Cycle at, std::uint8_t cause) {
 // A reset clears pin levels, cycle timers and settings that belong to the outside world.
 void Chip::after_reset() {
   std::memset(compare_, 0, sizeof compare_);
+  for (Top& top : top_) top.value = 0;
   sent_done_ = 0;
   for (int side = 0; side < 2; ++side) set_encoder(side, level_[side]);
   arm_timers();
@@ -285,6 +287,15 @@ void Chip::write_compare(avr_t* avr, Address address, std::uint8_t value, void* 
       static_cast<std::uint16_t>(value | avr->data[address + 1] << 8);
 }
 
+// ICRn takes a value in a mode only that uses it as top (datasheet, "input capture register"): 8, 10, 12, 14.
+void Chip::write_top(avr_t* avr, Address address, std::uint8_t value, void* param) {
+  Top& top = *static_cast<Top*>(param);
+  avr->data[address] = value;
+  const std::uint8_t b = avr->data[top.half->tccrb], a = avr->data[top.half->tccra];
+  const bool is_top = (b & kTopModeB) != 0 && (a & kTopNotA) == 0;
+  if (is_top) top.value = static_cast<std::uint16_t>(value | avr->data[address + 1] << 8);
+}
+
 double Chip::duty(int side) const {
   const BridgeHalf& half = kBridge[side];
   const std::uint8_t* data = avr_->data;
@@ -294,7 +305,7 @@ double Chip::duty(int side) const {
   const bool running = data[half.tccra] == kPwmModeA &&
                        (data[half.tccrb] & kPwmModeBMask) == kPwmModeB &&
                        (data[half.tccrb] & kClockMask) != 0;
-  const int top = data[half.icr] | data[half.icr + 1] << 8;
+  const int top = top_[side].value;
   if (!driven || !running || top == 0) return 0.0;
   const double forward = std::min<int>(compare_[side][0], top);
   const double backward = std::min<int>(compare_[side][1], top);

@@ -102,6 +102,7 @@ class Chip {
   static void on_output(avr_irq_t* irq, std::uint32_t byte, void* self);
   static void on_sleep(avr_t* avr, Cycle cycles);
   static void write_compare(avr_t* avr, Address address, std::uint8_t value, void* whole);
+  static void write_top(avr_t* avr, Address address, std::uint8_t value, void* half);
   static void write_divider(avr_t* avr, Address address, std::uint8_t value, void* self);
 
   avr_t* avr_ = nullptr;
@@ -115,6 +116,11 @@ class Chip {
 
   std::uint8_t level_[2] = {};            // encoder lines as they are outside
   std::uint16_t compare_[2][2] = {};      // [side][forward, backward], as last written whole
+  struct Top {
+    const BridgeHalf* half;
+    std::uint16_t value;
+  };
+  Top top_[2] = {{&kBridge[0], 0}, {&kBridge[1], 0}};  // ICRn, as taken
   std::uint32_t program_end_ = kRamStart;  // first RAM address behind the program's variables
   std::deque<Level> levels_;
   std::deque<Incoming> incoming_;

@@ -38,6 +38,8 @@ constexpr BridgeHalf kBridge[2] = {
 };
 // Phase-correct PWM with ICRn as top, both channels non-inverting, clock running at any rate.
 constexpr std::uint8_t kPwmModeA = 0xA2, kPwmModeB = 0x10, kPwmModeBMask = 0x18, kClockMask = 0x07;
+// Modes that have ICRn as top: WGMn3 set, WGMn0 clear.
+constexpr std::uint8_t kTopModeB = 0x10, kTopNotA = 0x01;
 
 struct UartRegisters {
   Address ucsra, ubrrl, ubrrh;

@@ -103,7 +103,8 @@ typedef enum MAV_RESULT
    MAV_RESULT_DENIED=2, /*  | */
    MAV_RESULT_UNSUPPORTED=3, /*  | */
    MAV_RESULT_FAILED=4, /*  | */
-   MAV_RESULT_ENUM_END=5, /*  | */
+   MAV_RESULT_IN_PROGRESS=5, /*  | */
+   MAV_RESULT_ENUM_END=6, /*  | */
 } MAV_RESULT;
 #endif
 

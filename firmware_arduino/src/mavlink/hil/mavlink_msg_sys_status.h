@@ -14,7 +14,7 @@ typedef struct __mavlink_sys_status_t {
  uint16_t voltage_battery; /*< [mV] Battery voltage.*/
  int16_t current_battery; /*< [cA] -1: not measured.*/
  uint16_t drop_rate_comm; /*< [c%] Share of frames from the host lost on the way since start.*/
- uint16_t errors_comm; /*<  Frames received with a wrong checksum or length.*/
+ uint16_t errors_comm; /*<  Frames received with a wrong checksum or length. This and the counts below stay at 65535 once they are there.*/
  uint16_t errors_count1; /*<  Tick overruns.*/
  uint16_t errors_count2; /*<  Frames lost from the host (gaps in the sequence).*/
  uint16_t errors_count3; /*<  Frames to the host dropped because the buffer was full.*/
@@ -87,7 +87,7 @@ typedef struct __mavlink_sys_status_t {
  * @param current_battery [cA] -1: not measured.
  * @param battery_remaining [%] -1: not measured.
  * @param drop_rate_comm [c%] Share of frames from the host lost on the way since start.
- * @param errors_comm  Frames received with a wrong checksum or length.
+ * @param errors_comm  Frames received with a wrong checksum or length. This and the counts below stay at 65535 once they are there.
  * @param errors_count1  Tick overruns.
  * @param errors_count2  Frames lost from the host (gaps in the sequence).
  * @param errors_count3  Frames to the host dropped because the buffer was full.
@@ -152,7 +152,7 @@ static inline uint16_t mavlink_msg_sys_status_pack(uint8_t system_id, uint8_t co
  * @param current_battery [cA] -1: not measured.
  * @param battery_remaining [%] -1: not measured.
  * @param drop_rate_comm [c%] Share of frames from the host lost on the way since start.
- * @param errors_comm  Frames received with a wrong checksum or length.
+ * @param errors_comm  Frames received with a wrong checksum or length. This and the counts below stay at 65535 once they are there.
  * @param errors_count1  Tick overruns.
  * @param errors_count2  Frames lost from the host (gaps in the sequence).
  * @param errors_count3  Frames to the host dropped because the buffer was full.
@@ -220,7 +220,7 @@ static inline uint16_t mavlink_msg_sys_status_pack_status(uint8_t system_id, uin
  * @param current_battery [cA] -1: not measured.
  * @param battery_remaining [%] -1: not measured.
  * @param drop_rate_comm [c%] Share of frames from the host lost on the way since start.
- * @param errors_comm  Frames received with a wrong checksum or length.
+ * @param errors_comm  Frames received with a wrong checksum or length. This and the counts below stay at 65535 once they are there.
  * @param errors_count1  Tick overruns.
  * @param errors_count2  Frames lost from the host (gaps in the sequence).
  * @param errors_count3  Frames to the host dropped because the buffer was full.
@@ -324,7 +324,7 @@ static inline uint16_t mavlink_msg_sys_status_encode_status(uint8_t system_id, u
  * @param current_battery [cA] -1: not measured.
  * @param battery_remaining [%] -1: not measured.
  * @param drop_rate_comm [c%] Share of frames from the host lost on the way since start.
- * @param errors_comm  Frames received with a wrong checksum or length.
+ * @param errors_comm  Frames received with a wrong checksum or length. This and the counts below stay at 65535 once they are there.
  * @param errors_count1  Tick overruns.
  * @param errors_count2  Frames lost from the host (gaps in the sequence).
  * @param errors_count3  Frames to the host dropped because the buffer was full.
@@ -521,7 +521,7 @@ static inline uint16_t mavlink_msg_sys_status_get_drop_rate_comm(const mavlink_m
 /**
  * @brief Get field errors_comm from sys_status message
  *
- * @return  Frames received with a wrong checksum or length.
+ * @return  Frames received with a wrong checksum or length. This and the counts below stay at 65535 once they are there.
  */
 static inline uint16_t mavlink_msg_sys_status_get_errors_comm(const mavlink_message_t* msg)
 {

@@ -60,10 +60,12 @@ void bind_odometry(nb::module_& m) {
   nb::class_<Geometry>(m, "Geometry")
       .def("__init__",
            [](Geometry* self, double wheel_radius_m, double track_width_m, double d0_m,
-              double rad_per_count) {
-             new (self) Geometry{wheel_radius_m, track_width_m, d0_m, rad_per_count};
+              double rad_per_count, double omega_max_rad_s) {
+             new (self)
+                 Geometry{wheel_radius_m, track_width_m, d0_m, rad_per_count, omega_max_rad_s};
            },
-           "wheel_radius_m"_a, "track_width_m"_a, "d0_m"_a, "rad_per_count"_a)
+           "wheel_radius_m"_a, "track_width_m"_a, "d0_m"_a, "rad_per_count"_a,
+           "omega_max_rad_s"_a = 40.0)
       .def("body",
            [](const Geometry& g, double left, double right) {
              const estimator::BodyMotion motion = g.body({left, right});
@@ -152,12 +154,18 @@ void bind_fused(nb::module_& m) {
       .def("take_pose",
            [](Fused& f, double t_exposure_s, double x_m, double y_m, double theta_rad,
               double sigma_xy_m, double sigma_theta_rad) {
-             f.take_pose(t_exposure_s, {x_m, y_m, theta_rad}, sigma_xy_m, sigma_theta_rad);
+             return f.take_pose(t_exposure_s, {x_m, y_m, theta_rad}, sigma_xy_m, sigma_theta_rad);
            },
            "t_exposure_s"_a, "x_m"_a, "y_m"_a, "theta_rad"_a, "sigma_xy_m"_a,
            "sigma_theta_rad"_a)
       .def("state_at", &state_at, "t_host_s"_a)
       .def("pose_age_s", &Fused::pose_age_s, "t_host_s"_a)
+      .def("agreement_age_s", &Fused::agreement_age_s, "t_host_s"_a)
+      .def_prop_ro("refused",
+                   [](const Fused& f) {
+                     const estimator::Innovation& i = f.refused();
+                     return nb::make_tuple(i[0], i[1], i[2]);
+                   })
       .def_prop_ro("covariance", [](const Fused& f) { return f.filter().covariance(); })
       .def_prop_ro("scales",
                    [](const Fused& f) {

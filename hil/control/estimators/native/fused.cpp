@@ -6,12 +6,15 @@
 namespace estimator {
 namespace {
 
-// A wheel never turns this fast: a larger step of the counter is a restarted board.
-constexpr double kOmegaImpossible_rad_s = 200.0;
+// Reports are dated to this or better: what a wheel can turn meanwhile is no sign of a restart.
+constexpr double kDating_s = 0.02;
 // Without reports for longer the board has stopped by itself: predict no further on commands.
 constexpr double kHorizon_s = 0.3;
-// Gated poses whose innovations differ by less than this agree with each other (m, m, rad).
+// Gated poses agree with each other when each lies within this of where the two before it, carried on
+// steadily, put it (m, m, rad): the robot was moved, or slides.
 constexpr Innovation kAgree{0.02, 0.02, 0.1};
+// No robot slides faster (m/s, m/s, rad/s): two poses further apart are of two things.
+constexpr Innovation kSlide{3.0, 3.0, 12.0};
 
 }  // namespace
 
@@ -25,6 +28,8 @@ Fused::Fused(const Assumptions& assumptions, const Geometry& geometry)
 double Fused::pose_age_s(double t_host_s) const {
   return t_pose_s_ ? t_host_s - *t_pose_s_ : std::numeric_limits<double>::infinity();
 }
+
+double Fused::agreement_age_s(double t_host_s) const { return t_host_s - t_agreed_s_; }
 
 void Fused::take_command(double t_effect_s, const Sides& omega_rad_s) {
   commands_.add(t_effect_s, omega_rad_s);
@@ -44,7 +49,7 @@ void Fused::take_wheels(double t_host_s, std::int32_t counts_left, std::int32_t 
   const Sides turned_rad{unit * counts_between(last.counts_left, report.counts_left),
                          unit * counts_between(last.counts_right, report.counts_right)};
   if (std::max(std::fabs(turned_rad[0]), std::fabs(turned_rad[1])) >
-      kOmegaImpossible_rad_s * dt_s) {
+      geometry_.omega_max_rad_s * (dt_s + kDating_s)) {
     speeds_.restart();
     return;
   }
@@ -95,60 +100,65 @@ WheelSpeeds::Ahead Fused::ahead(double t_s) const {
   return speeds_.ahead(commanded(begin_s, std::min(t_s, begin_s + kHorizon_s)));
 }
 
-// Moves the anchor to t_s over the increments, the last one cut there.
+// Moves the anchor to t_s over the increments, one by one as the head goes (a turn before a straight is
+// another way than after it); the last one is cut there.
 void Fused::advance(double t_s) {
   if (t_anchor_s_ > kNever_s && t_s > t_head()) {
     const BodyMotion beyond = geometry_.body(ahead(t_s).angle_rad);
     extend(t_head(), t_s, beyond);
   }
-  double forward = 0.0, turn = 0.0, length = 0.0, angle = 0.0;
   while (!path_.empty() && path_.front().begin_s < t_s) {
     Increment& first = path_.front();
-    double step = first.forward_m, d_theta = first.turn_rad;
+    Increment step = first;
     if (first.end_s > t_s) {
       const double part = (t_s - first.begin_s) / (first.end_s - first.begin_s);
       const double rest = 1.0 - part;
-      first = {t_s, first.end_s, step * rest, d_theta * rest};
-      step *= part;
-      d_theta *= part;
+      step = {first.begin_s, t_s, first.forward_m * part, first.turn_rad * part};
+      first = {t_s, first.end_s, first.forward_m * rest, first.turn_rad * rest};
     } else {
       path_.pop_front();
     }
-    forward += step;
-    turn += d_theta;
-    length += std::fabs(step);
-    angle += std::fabs(d_theta);
+    move_anchor(step.end_s, {step.forward_m, step.turn_rad});
   }
-  if (t_pose_s_) filter_.move(t_s - t_anchor_s_, forward, turn, length, angle);
-  t_anchor_s_ = t_s;
+  move_anchor(t_s, {0.0, 0.0});  // where no report tells of motion, time alone passes
 }
 
-void Fused::take_pose(double t_exposure_s, const Pose& pose, double sigma_xy_m,
+void Fused::move_anchor(double t_s, const BodyMotion& by) {
+  if (t_pose_s_ && t_s > t_anchor_s_) {
+    filter_.move(t_s - t_anchor_s_, by.forward_m, by.turn_rad, std::fabs(by.forward_m),
+                 std::fabs(by.turn_rad));
+  }
+  t_anchor_s_ = std::max(t_s, t_anchor_s_);
+}
+
+bool Fused::take_pose(double t_exposure_s, const Pose& pose, double sigma_xy_m,
                       double sigma_theta_rad) {
-  if (!(t_exposure_s > t_anchor_s_)) return;  // a time that is no number too
+  if (!(t_exposure_s > t_anchor_s_)) return false;  // a time that is no number too
   if (!std::isfinite(pose.x_m + pose.y_m + pose.theta_rad + sigma_xy_m + sigma_theta_rad)) {
     ++gated_total_;
-    return;
+    return false;
   }
   advance(t_exposure_s);
+  bool believed = true;
   if (t_pose_s_) {
-    correct(t_exposure_s, pose, sigma_xy_m, sigma_theta_rad);
+    believed = correct(t_exposure_s, pose, sigma_xy_m, sigma_theta_rad);
   } else {
     place(t_exposure_s, pose, sigma_xy_m, sigma_theta_rad);
+    t_agreed_s_ = t_exposure_s;  // nothing to disagree with yet
   }
   head_ = anchor();
   for (const Increment& i : path_) head_ = moved(head_, {i.forward_m, i.turn_rad});
+  return believed;
 }
 
 // Sets the anchor on a pose.
 void Fused::place(double t_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad) {
   filter_.place(pose, sigma_xy_m, sigma_theta_rad);
   t_pose_s_ = t_s;
-  gated_run_ = 0;
 }
 
 // Corrects the anchor by a pose; a run of gated poses that agree moves it there instead.
-void Fused::correct(double t_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad) {
+bool Fused::correct(double t_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad) {
   const BodyMotion speed = geometry_.body(speeds_.omega_rad_s());
   const Innovation innovation = filter_.innovation(pose);
   // An exposure dated wrongly by sigma_time looks like an error along the motion.
@@ -156,23 +166,32 @@ void Fused::correct(double t_s, const Pose& pose, double sigma_xy_m, double sigm
   const double var_xy = square(sigma_xy_m) + square(sigma_time_s * speed.forward_m);
   const double var_theta = square(sigma_theta_rad) + square(sigma_time_s * speed.turn_rad);
   if (filter_.correct(innovation, var_xy, var_theta, assumptions_.gate_chi2)) {
-    t_pose_s_ = t_s;
-    gated_run_ = 0;
-    return;
+    t_pose_s_ = t_agreed_s_ = t_s;
+    gated_.run = 0;
+    return true;
   }
   ++gated_total_;
-  gated_run_ = gated_poses_agree(innovation) ? gated_run_ + 1 : 1;
-  if (gated_run_ >= assumptions_.reacquire_poses) place(t_s, pose, sigma_xy_m, sigma_theta_rad);
+  refused_ = innovation;
+  note_gated(t_s, innovation);
+  if (gated_.run < assumptions_.reacquire_poses) return false;
+  place(t_s, pose, sigma_xy_m, sigma_theta_rad);
+  gated_.innovation = {0.0, 0.0, 0.0};  // the run goes on from the pose believed
+  return true;
 }
 
-// Whether a gated pose continues a run of gated ones; it is the one to compare with from now on.
-bool Fused::gated_poses_agree(const Innovation& innovation) {
-  bool agree = gated_run_ > 0;
+// Counts a gated pose into the run of gated ones that it carries on, or starts a new run with it.
+void Fused::note_gated(double t_s, const Innovation& innovation) {
+  const double dt_s = t_s - gated_.t_s;
+  bool agree = gated_.run > 0;
+  Innovation rate{};
   for (int i = 0; i < 3; ++i) {
-    agree = agree && std::fabs(innovation[i] - gated_innovation_[i]) < kAgree[i];
+    const double step = innovation[i] - gated_.innovation[i];
+    rate[i] = step / dt_s;
+    const double steady = gated_.run > 1 ? gated_.rate[i] * dt_s : 0.0;
+    const double limit = gated_.run > 1 ? kAgree[i] : kAgree[i] + kSlide[i] * dt_s;
+    agree = agree && std::fabs(step - steady) < limit;
   }
-  gated_innovation_ = innovation;
-  return agree;
+  gated_ = {agree ? gated_.run + 1 : 1, t_s, innovation, agree ? rate : Innovation{}};
 }
 
 // The place at a time before the head, not before the anchor.

@@ -41,15 +41,23 @@ class Fused {
   // Takes one wheel report (in time order; a stale one is dropped).
   void take_wheels(double t_host_s, std::int32_t counts_left, std::int32_t counts_right);
 
-  // Takes the pose seen at t_exposure_s in the past; older than the last one is dropped.
-  void take_pose(double t_exposure_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad);
+  // Takes the pose seen at t_exposure_s in the past; older than the last one is dropped. Says whether it was
+  // believed: it passed the gate, or ended a run of gated ones that agree.
+  bool take_pose(double t_exposure_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad);
 
   // The state at t_host_s, past the last exposure; nothing before the first pose. Speeds are predicted; for
   // a time already passed they are those of the latest report.
   std::optional<State> state_at(double t_host_s) const;
 
-  // Time since the last exposure that was believed; inf before the first.
+  // Time since the last exposure that was believed, by the gate or by a run of gated poses that agree; inf
+  // before the first.
   double pose_age_s(double t_host_s) const;
+
+  // Time since the last exposure whose pose agreed with the wheels (passed the gate); inf before the first.
+  double agreement_age_s(double t_host_s) const;
+
+  // The last pose refused minus the pose expected then; zero before the first.
+  const Innovation& refused() const { return refused_; }
 
   // The filter at the last exposure.
   const PoseFilter& filter() const { return filter_; }
@@ -67,6 +75,11 @@ class Fused {
   struct Increment {  // odometry between two instants, in believed units
     double begin_s, end_s, forward_m, turn_rad;
   };
+  struct GatedRun {  // gated poses in a row that agree with each other; the last one and its rate of change
+    int run = 0;
+    double t_s = kNever_s;
+    Innovation innovation{}, rate{};
+  };
 
   double t_head() const;
   WheelSpeeds::Ahead ahead(double t_s) const;
@@ -76,9 +89,10 @@ class Fused {
   const std::vector<Piece>& commanded(double begin_s, double end_s) const;
   void extend(double begin_s, double end_s, const BodyMotion& by);
   void advance(double t_s);
+  void move_anchor(double t_s, const BodyMotion& by);
   void place(double t_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad);
-  void correct(double t_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad);
-  bool gated_poses_agree(const Innovation& innovation);
+  bool correct(double t_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad);
+  void note_gated(double t_s, const Innovation& innovation);
 
   Assumptions assumptions_;
   Geometry geometry_;
@@ -90,8 +104,9 @@ class Fused {
   double t_anchor_s_ = kNever_s;
   FlatPose head_{0.0, 0.0, 0.0};
   std::optional<double> t_pose_s_;
-  Innovation gated_innovation_{};
-  int gated_run_ = 0;
+  double t_agreed_s_ = kNever_s;
+  GatedRun gated_;
+  Innovation refused_{};
   std::int64_t gated_total_ = 0;
   mutable std::vector<Piece> pieces_;  // answer of `commanded`; kept so that asking does not allocate
 };

@@ -21,6 +21,7 @@ struct BodyMotion {
 // The robot as the host believes it to be (hil.control.estimators.BelievedGeometry).
 struct Geometry {
   double wheel_radius_m, track_width_m, d0_m, rad_per_count;
+  double omega_max_rad_s;  // no wheel turns faster: a larger step of its counter is a restarted board
 
   // Motion of the body from wheel angles in rad, or its speeds from wheel speeds in rad/s.
   BodyMotion body(const Sides& wheels) const {
