@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hil.core.errors import BadInput
+from hil.record.writing import GuardedFile, Keeping
 
 _STAMP = struct.Struct(">Q")
 _MAGIC_2 = 0xFD
@@ -30,8 +31,8 @@ class LoggedFrame(NamedTuple):
 class TlogWriter:
     """Writes whole MAVLink frames of both directions in the order in which they are given."""
 
-    def __init__(self, path: Path, start_unix_us: int) -> None:
-        self._file = path.open("wb")
+    def __init__(self, path: Path, start_unix_us: int, keeping: Keeping) -> None:
+        self._file = GuardedFile(path, keeping)
         self.start_unix_us = start_unix_us
 
     def write(self, t_s: float, frame: bytes) -> None:

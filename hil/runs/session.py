@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from hil.core.errors import RigFault
+from hil.core.errors import RecordFault, RigFault
+from hil.core.registry import in_one_line
 from hil.core.types import PoseMeasurement
 from hil.record.tick_rows import sample_row
 from hil.runs.supervision import Supervisor
@@ -102,6 +104,7 @@ class Session:
         self._camera_latency_s = math.nan
         self._poses = 0
         self._uplink_s = scenario.link.latency_s
+        self.error: Exception | SystemExit | None = None  # what ended the run and is no rig fault
 
     def run(self) -> Ending:
         """Run all phases; the robot is stopped whatever happens."""
@@ -114,13 +117,23 @@ class Session:
             ending = Ending("complete")
         except RigFault as fault:
             ending = Ending("fault", str(fault))
-        except KeyboardInterrupt:
-            ending = Ending("interrupted", "Ctrl-C")
+        except KeyboardInterrupt as stop:
+            ending = Ending("interrupted", str(stop) or "Ctrl-C")
+        except (Exception, SystemExit) as error:
+            self.error = error
+            ending = Ending("fault", in_one_line(error))
         finally:
             self._stop()
-        self._note(ending.outcome, ending.detail)
-        self._parts.timeline.start(self._parts.rig.now_s())
+        with suppress(RecordFault):  # closing the record says so
+            self._note(ending.outcome, ending.detail)
+            self._parts.timeline.start(self._parts.rig.now_s())
         return ending
+
+    def halt(self) -> None:
+        """Send the emergency stop at once and wait for nothing."""
+        if self._may_move:
+            with suppress(Exception):
+                self._parts.link.stop_now(self._parts.rig.now_s())
 
     # -- phases --------------------------------------------------------------------------------
 
@@ -210,8 +223,11 @@ class Session:
             reason = "no answer to the stop; the board's own time-out ends its motion"
         except (RigFault, KeyboardInterrupt) as error:
             reason = str(error) or "Ctrl-C"
+        except Exception as error:
+            self.error, reason = self.error or error, in_one_line(error)
         link.stop_now(rig.now_s())
-        self._note("stop", f"emergency stop sent: {reason}")
+        with suppress(RecordFault):
+            self._note("stop", f"emergency stop sent: {reason}")
 
     # -- events --------------------------------------------------------------------------------
 
