@@ -116,7 +116,7 @@ def _run_command() -> int:  # noqa: PLR0911 - one return for each kind of end
     except SystemExit as error:
         return error.code if isinstance(error.code, int) else 0
     except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
+        where = f"{error.filename}: " if error.filename else "output cannot be written: "
         return _say(f"{where}{error.strerror or error}", RigFault.exit_status)
     return status if isinstance(status, int) else 0
 
