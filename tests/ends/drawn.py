@@ -51,26 +51,28 @@ def end(kind: str, rng: random.Random, folder: Path) -> End:
     drawn = rng.uniform(0.0, WHOLE_S)
     limit_bytes = int(10.0 ** rng.uniform(3.3, 6.0)) if kind == "file limit" else None
 
-    def limit() -> None:
-        if limit_bytes is not None:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (limit_bytes, limit_bytes))
-
     process = subprocess.Popen(
-        [*RUN, "--out", str(folder)], preexec_fn=limit, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        [*RUN, "--out", str(folder)], text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )  # fmt: skip
-    if limit_bytes is None:
+    if limit_bytes is not None:
+        limit_files(process, limit_bytes)
+    else:
         wait_for_python(process)
         time.sleep(drawn if kind != "folder gone" else 0.0)
     _strike(kind, process, folder, rng)
     out, said = process.communicate(timeout=120)
-    allowed = _statuses(kind, process.returncode, folder)
+    allowed = _statuses(kind, folder)
     flaws = [] if process.returncode in allowed else [f"status {process.returncode}: {said[-300:]}"]
     if "Traceback" in said:
         flaws.append("a traceback")
-    flaws += _flaws_of(folder, process.returncode)
+    flaws += _flaws_of(folder, status)
     at = float(limit_bytes) if limit_bytes is not None else drawn
-    return End(kind, at, process.returncode, (said or out).strip(), tuple(flaws))
+    return End(kind, at, status, (said or out).strip(), tuple(flaws))
+
+
+def limit_files(process: subprocess.Popen[str], limit_bytes: int) -> None:
+    """Let no file of the process grow beyond that."""
+    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (limit_bytes, limit_bytes))
 
 
 def wait_for_python(process: subprocess.Popen[str]) -> None:
@@ -98,7 +100,7 @@ def _strike(kind: str, process: subprocess.Popen[str], folder: Path, rng: random
         process.send_signal(signal.Signals[kind])
 
 
-def _statuses(kind: str, status: int, folder: Path) -> set[int]:
+def _statuses(kind: str, folder: Path) -> set[int]:
     """Return the statuses that are right for an end of this kind; an end too late is none at all."""
     finished = {0, 1} if _outcome(folder) in {"complete", ""} else set()
     if kind in signal.Signals.__members__:
