@@ -83,7 +83,7 @@ def main() -> NoReturn:
     try:
         sys.stdout.flush()
     except OSError as error:
-        status = _say(f"results cannot be written: {error.strerror}", RigFault.exit_status)
+        status = _say(f"output cannot be written: {error.strerror}", RigFault.exit_status)
     sys.exit(status)
 
 

@@ -61,8 +61,12 @@ def end(kind: str, rng: random.Random, folder: Path) -> End:
         time.sleep(drawn if kind != "folder gone" else 0.0)
     _strike(kind, process, folder, rng)
     out, said = process.communicate(timeout=120)
-    allowed = _statuses(kind, folder)
-    flaws = [] if process.returncode in allowed else [f"status {process.returncode}: {said[-300:]}"]
+    status = process.returncode
+    if (
+        status < 0 and "stopped by" in said
+    ):  # once more after the last word, as the interpreter ends
+        status = 128 - status
+    flaws = [] if status in _statuses(kind, folder) else [f"status {status}: {said[-300:]}"]
     if "Traceback" in said:
         flaws.append("a traceback")
     flaws += _flaws_of(folder, status)

@@ -204,4 +204,4 @@ def test_results_that_cannot_be_written_are_no_verdict() -> None:
             [*HIL, "--help"], stdout=full, stderr=subprocess.PIPE, text=True, check=False
         )
     assert done.returncode == 3
-    assert done.stderr.splitlines() == ["hil: results cannot be written: No space left on device"]
+    assert done.stderr.splitlines() == ["hil: output cannot be written: No space left on device"]
