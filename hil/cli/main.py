@@ -13,7 +13,7 @@ from hil import __version__
 from hil.cli.streams import let_readers_go
 from hil.core.errors import HilError, RigFault, stop_status
 from hil.core.text import visible
-from hil.runs.interruption import end_at_once, last_stop, take_signals
+from hil.runs.interruption import ignore_signals, last_stop, take_signals
 
 # name -> (module, one-line help). The text stands here so that `hil --help` imports no command.
 COMMANDS = {
@@ -79,7 +79,7 @@ def main() -> NoReturn:
     let_readers_go()
     take_signals()
     status = _run()
-    end_at_once()
+    ignore_signals()
     try:
         sys.stdout.flush()
     except OSError as error:

@@ -12,7 +12,6 @@ in the background) stay ignored.
 
 from __future__ import annotations
 
-import os
 import signal
 import threading
 from types import FrameType
@@ -40,9 +39,9 @@ def take_signals() -> None:
     _handle(_stop)
 
 
-def end_at_once() -> None:
-    """Let the signals end the process on the spot: its work is done, its status known."""
-    _handle(_leave)
+def ignore_signals() -> None:
+    """Ignore the signals to the end: the work is done, and its status known."""
+    _handle(signal.SIG_IGN)
 
 
 def _handle(handler: Any) -> None:
@@ -58,10 +57,6 @@ def _noted(number: int) -> Stopped:
 
 def _stop(number: int, _frame: FrameType | None) -> NoReturn:
     raise _noted(number)
-
-
-def _leave(number: int, _frame: FrameType | None) -> NoReturn:
-    os._exit(128 + number)
 
 
 class CtrlC:

@@ -16,6 +16,7 @@ from hil.core.errors import RecordFault, RigFault
 from hil.core.registry import in_one_line
 from hil.core.types import PoseMeasurement
 from hil.record.tick_rows import sample_row
+from hil.runs.plausibility import Plausibility
 from hil.runs.supervision import Supervisor
 from hil.wire import handshake
 from hil.wire.refusal import refused_set_point
@@ -98,6 +99,7 @@ class Session:
         self._report: WheelReport | None = None
         self._measurement: PoseMeasurement | None = None
         self._supervisor = Supervisor(scenario.safety, parts.estimator)
+        self._plausibility = Plausibility(scenario.safety.reactions, self._note)
         self._pose_time_s = -math.inf  # of the newest pose believed
         self._seen = self._accepted = False  # since the last tick
         self._camera_restarts = 0
@@ -125,6 +127,7 @@ class Session:
         finally:
             self._stop()
         with suppress(RecordFault):  # closing the record says so
+            self._plausibility.finish()
             self._note(ending.outcome, ending.detail)
             self._parts.timeline.start(self._parts.rig.now_s())
         return ending
@@ -203,6 +206,8 @@ class Session:
                 law.reset(reference, estimate)
             command = law.step(reference, estimate, period_s)
             wheels = self._command_wheels(now_s, command)
+            self._plausibility.asked(*wheels)
+            self._plausibility.check_progress(now_s, math.dist(reference.z1_m, estimate.z1_m))
             self._record(now_s, command, wheels, now_s - due_s > _LATE_RATIO * period_s)
             if self._publish is not None:
                 self._publish(now_s, estimate, self._parts.link.armed)
@@ -310,6 +315,7 @@ class Session:
             if parts.estimator.on_pose(exposure_s, measurement):
                 self._pose_time_s = exposure_s
                 self._accepted = True
+        self._plausibility.saw(frame, self._report, parts.geometry.rad_per_count)
         self._supervisor.saw(exposure_s, measurement)
         parts.timeline.camera_frame(frame, now_s, exposure_s, measurement)
 
@@ -317,7 +323,10 @@ class Session:
         """Raise RigFault when the host itself must stop the robot."""
         if self._refusal:
             raise RigFault(f"board: {self._refusal}")
-        self._supervisor.check(now_s, self._parts.link, self._report)
+        link = self._parts.link
+        self._supervisor.check(now_s, link, self._report)
+        if self._report is not None:
+            self._plausibility.check(now_s, self._report, link.info.pwm_top_counts)
 
     def _measured(self, frame: Frame, exposure_s: float) -> PoseMeasurement:
         """Return the frame's own pose, else what the localiser finds near the estimate."""

@@ -62,14 +62,10 @@ def end(kind: str, rng: random.Random, folder: Path) -> End:
     _strike(kind, process, folder, rng)
     out, said = process.communicate(timeout=120)
     status = process.returncode
-    if (
-        status < 0 and "stopped by" in said
-    ):  # once more after the last word, as the interpreter ends
-        status = 128 - status
     flaws = [] if status in _statuses(kind, folder) else [f"status {status}: {said[-300:]}"]
     if "Traceback" in said:
-        flaws.append("a traceback")
-    flaws += _flaws_of(folder, status)
+        flaws.append(f"a traceback: {said[-1500:]}")
+    flaws += _flaws_of(folder, status) if kind != "folder gone" else _left_over(folder)
     at = float(limit_bytes) if limit_bytes is not None else drawn
     return End(kind, at, status, (said or out).strip(), tuple(flaws))
 
@@ -117,6 +113,11 @@ def _statuses(kind: str, folder: Path) -> set[int]:
 def _outcome(folder: Path) -> str:
     path = folder / "manifest.json"
     return str(json.loads(path.read_text())["outcome"]) if path.exists() else ""
+
+
+def _left_over(folder: Path) -> list[str]:
+    """Return what is wrong with what a folder torn to pieces still holds."""
+    return ["the outcome is still running"] if _outcome(folder) == "running" else []
 
 
 def _flaws_of(folder: Path, status: int) -> list[str]:
