@@ -28,6 +28,7 @@ COMMANDS = {
     "view": ("hil.cli.view", "Open recorded runs in the viewer."),
     "sweep": ("hil.cli.sweep", "Run a campaign over grids, lists and distributions; draw maps."),
     "tune": ("hil.cli.tune", "Tune the gains of both laws by one procedure and budget."),
+    "faults": ("hil.cli.faults", "Break everything once: each fault at each instant."),
     "twin": ("hil.cli.twin", "Serve the digital twin to other programs."),
     "firmware": ("hil.cli.firmware", "Generate, build, upload and configure the firmware."),
     "calibrate": ("hil.cli.calibrate", "Calibrate lens, camera pose over the floor, and colours."),
