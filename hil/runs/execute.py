@@ -136,11 +136,13 @@ def execute(
             )
             try:
                 parts = make_parts(spec, TapedRig(rig, recorder.tape, ctrl_c.obey), recorder, law)
+                session = Session(
+                    spec.scenario, parts, parameters, board_hashes, progress, publish
+                )  # fmt: skip
             except Exception as error:
                 ctrl_c.close()
                 recorder.close("fault", in_one_line(error))
                 raise fault_of(error, used_things(spec)) or error from None
-            session = Session(spec.scenario, parts, parameters, board_hashes, progress, publish)
             ending = _conduct(session, ctrl_c, used_things(spec))
             record = recorder.close(ending.outcome, ending.detail, link_stats(parts.link))
         if session.error is not None and fault_of(session.error, used_things(spec)) is None:

@@ -12,6 +12,7 @@ in the background) stay ignored.
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 from types import FrameType
@@ -55,8 +56,20 @@ def _noted(number: int) -> Stopped:
     return _Last.stopped
 
 
-def _stop(number: int, _frame: FrameType | None) -> NoReturn:
-    raise _noted(number)
+def _stop(number: int, frame: FrameType | None) -> NoReturn:
+    stopped = _noted(number)
+    if _imports(frame):  # nothing is begun, and compiled modules do not survive an exception there
+        os.write(2, f"hil: stopped by {stopped}\n".encode())
+        os._exit(128 + number)
+    raise stopped
+
+
+def _imports(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False
 
 
 class CtrlC:

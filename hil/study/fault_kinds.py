@@ -10,7 +10,7 @@ INSTANTS = {
     "before arming": 0.0,
     "at start": 0.05,
     "at speed": 1.0,
-    "at rest": 15.0,
+    "at rest": 11.0,
     "closing": 0.0,
 }
 CLOSING = "closing"

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from hil.core.rig import Frame, Rig, Truth
     from hil.record.reader import RunRecord
 
-SCENARIO, DURATION_S = "scenario-1", 20.0
+SCENARIO, DURATION_S = "scenario-1", 14.0
 LAWS = ("pid", "asg-ism")
 # Limits of a cell. The drive is off REST_S after the stop at the latest; what is left is the robot's
 # own coasting against its friction, which takes 0.8 to 1.7 m/s^2 off its speed on the shipped robot.
