@@ -22,6 +22,7 @@ from hil.config.limits import board_defaults, check_board
 from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
+from hil.core.files import read_text
 from hil.core.registry import is_file_name
 
 # Values that would be laid aside: the command's own option (in a campaign, its list) decides them.
@@ -168,7 +169,7 @@ def _read_text(name_or_path: str, kind: str) -> tuple[str, str, Path | None]:
         hint = f"did you mean {' or '.join(near)}?" if near else f"built in: {', '.join(names)}"
         raise BadInput(f"{one} {name_or_path!r}: no such file and no built-in {one}; {hint}")
     try:
-        return path.read_text(encoding="utf-8"), str(path), path.parent
+        return read_text(path), str(path), path.parent
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(f"{path}: cannot be read: {error}") from None
 

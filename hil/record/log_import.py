@@ -35,6 +35,7 @@ from hil.config.load import load_scenario
 from hil.control.estimators.geometry import BelievedGeometry
 from hil.control.references import make_reference
 from hil.core.errors import BadInput
+from hil.core.files import LOG_BYTES, check_size, read_bounded, read_text
 from hil.record.manifest import Manifest, collect_versions, git_revision
 from hil.record.recorder import Recorder
 from hil.record.schema import SAMPLE_NAMES
@@ -131,7 +132,7 @@ def _read_mapping(path: Path | None) -> LogMapping:
     if path is None:
         return LogMapping()
     try:
-        settings = LogMapping.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+        settings = LogMapping.model_validate(tomllib.loads(read_text(path)))
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(f"mapping {path}: cannot be read: {error}") from None
     except tomllib.TOMLDecodeError as error:
@@ -155,6 +156,7 @@ def _beside(mapping: Path | None, name: str) -> str:
 
 def _read_csv(path: Path, settings: LogMapping) -> Signals:
     try:
+        check_size(path)
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = list(csv.DictReader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
@@ -224,7 +226,7 @@ def _messages(path: Path) -> Iterator[Message]:
         (ardupilotmega.MAVLink(None), ardupilotmega.mavlink_map),
     ]
     try:
-        data = path.read_bytes()
+        data = read_bounded(path, LOG_BYTES)
     except OSError as error:
         raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
     at = 0

@@ -17,6 +17,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError
 
 from hil.core.errors import BadInput
+from hil.core.files import RECORD_BYTES, read_bounded
 from hil.core.registry import Entry
 from hil.record import layout
 from hil.record.schema import SCHEMA_VERSION
@@ -123,7 +124,7 @@ def read_manifest(folder: Path) -> Manifest:
     if not path.is_file():
         raise BadInput(f"{folder}: not a run record ({layout.MANIFEST} is missing)")
     try:
-        tree = json.loads(path.read_bytes())
+        tree = json.loads(read_bounded(path, RECORD_BYTES))
     except (OSError, ValueError) as error:
         raise BadInput(f"{path}: damaged, not readable as JSON: {error}") from None
     found = tree.get("schema_version") if isinstance(tree, Mapping) else None

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hil.core.errors import BadInput
+from hil.core.files import LOG_BYTES, read_bounded
 from hil.record.writing import GuardedFile, Keeping
 
 _STAMP = struct.Struct(">Q")
@@ -51,7 +52,7 @@ class TlogWriter:
 
 def read_tlog(path: Path) -> Iterator[LoggedFrame]:
     """Yield every whole frame of a MAVLink 2 log; a torn last frame ends the iteration."""
-    data = path.read_bytes()
+    data = read_bounded(path, LOG_BYTES)
     at = 0
     while at + 8 + _HEADER_2 <= len(data):
         (stamp,) = _STAMP.unpack_from(data, at)

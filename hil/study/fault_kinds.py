@@ -22,7 +22,8 @@ class FaultRow:
     """One kind: what of `hil.config.events` makes it, and the pattern of the names that are right.
 
     `pulses_s` are (start, end) after the instant, end None for ever. `settings` are in force from the
-    begin to the end of a run, whatever the instant. A `slow` one is told and stops nothing.
+    begin to the end of a run, whatever the instant. A `slow` one is told and stops nothing, unless the
+    wheel stands: then it is a stall.
     """
 
     name: str
@@ -55,7 +56,7 @@ ROWS = (
     FaultRow("encoder phases swapped", "swapped_phases", "right", _WHEELS),
     FaultRow("motor reversed", "motor_reversed", "left", _WHEELS),
     FaultRow("motor stuck", "motor_stuck", "left", "motor stuck|STALL"),
-    FaultRow("motor weak", "motor_weak", "left", "side weak", slow=True),
+    FaultRow("motor weak", "motor_weak", "left", "side weak|STALL", slow=True),
     FaultRow("motors exchanged", "motors_exchanged", named=_WHEELS),
     FaultRow("encoders exchanged", "encoders_exchanged", named=_WHEELS),
     FaultRow("board reset", "board_reset", named="board:|link:", pulses_s=((0.0, 0.3),)),

@@ -11,6 +11,7 @@ from pathlib import Path
 from hil.config.limits import check_board
 from hil.config.load import check_edges
 from hil.core.errors import BadInput
+from hil.core.files import read_text
 from hil.record.manifest import replace_file
 from hil.rigs.serial import SerialRig, parse_target
 from hil.wire import handshake
@@ -72,7 +73,7 @@ def write_file(path: Path, parameters: Mapping[str, float]) -> None:
 def read_file(path: Path) -> dict[str, float]:
     """Return the [board] table of a file; raises BadInput."""
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8")).get("board")
+        table = tomllib.loads(read_text(path)).get("board")
     except (OSError, ValueError, RecursionError) as error:
         raise BadInput(f"{path}: not a readable parameter file: {error}") from None
     if not isinstance(table, dict) or not all(
