@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from hil.config.events import Disturbance, Fault
     from hil.config.robot import RobotConfig
 
-STEP_US = 100  # RK4 at 1e-4 s (control.md section 2)
+STEP_US = 100  # RK4 at 1e-4 s
 _UNSEEDED = 1 << 31
 _GROUPS = ("motor", "bridge", "battery", "floor")
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 from collections.abc import Collection
 from pathlib import Path
+from typing import Any
 
 # Read by OpenCV's video backend when it opens its first file.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
@@ -20,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hil.core.errors import BadInput
+from vision.picture_file import check_picture, without_orientation
 
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
@@ -38,8 +40,11 @@ CORNER_WINDOW_CELLS = 0.8
 
 IMAGE_SUFFIXES = {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"}
 PICTURE_SUFFIXES = (".png", ".jpg")
-_ENDINGS = {b"\xff\xd8": (b"\xff\xd9", "JPEG"), b"\x89PNG": (b"IEND", "PNG")}
-_ENDING_WITHIN_BYTES = 64
+# As the sensor saw it: an orientation tag turns the picture and not the lens before the sensor.
+_AS_STORED = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+# A 16-bit file with nothing above this once it is taken to 8 bits may hold fewer bits.
+_DARK_DN = 64
+_SENSOR_BITS = (8, 10, 12, 14)
 
 
 def points(array: ArrayLike | None) -> Array:
@@ -57,28 +62,42 @@ def ids(array: ArrayLike | None) -> Ids:
 
 
 def read_image(path: Path) -> Image:
-    """Return the image, (H, W, 3) BGR; BadInput when it is missing, damaged or no image.
+    """Return the image, (H, W, 3) BGR, in the sensor's own axes: orientation tags are not followed.
 
-    OpenCV returns a grey-filled picture for a JPEG that was cut off, so the file's end is checked.
+    BadInput when it is missing, damaged, no image, or larger than a camera file can describe; that
+    is seen in the file's header, before anything is decoded. OpenCV returns a grey-filled picture
+    for a JPEG that was cut off, so the file's end is checked too.
     """
     try:
         data = path.read_bytes()
     except OSError as error:
         raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
-    for start, (end, kind) in _ENDINGS.items():
-        if data.startswith(start) and end not in data[-_ENDING_WITHIN_BYTES:]:
-            raise BadInput(
-                f"{path}: damaged {kind}: its end is missing ({len(data)} bytes); copy it again"
-            )
-    image = None
-    if data:
-        try:
-            image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR)
-        except cv2.error:
-            image = None
+    check_picture(path, data)
+    data = without_orientation(data)
+    image = _decode(data, _AS_STORED)
     if image is None:
-        raise BadInput(f"{path}: not an image OpenCV can read ({len(data)} bytes)")
+        raise BadInput(f"{path}: not an image OpenCV can read ({len(data)} bytes); is it damaged?")
+    if image.max(initial=0) < _DARK_DN:
+        image = _lifted(data, image)
     return np.asarray(image, dtype=np.uint8)
+
+
+def _decode(data: bytes, flags: int) -> NDArray[Any] | None:
+    try:
+        image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
+    except cv2.error:
+        return None
+    return None if image is None else np.asarray(image)
+
+
+def _lifted(data: bytes, image: NDArray[Any]) -> NDArray[Any]:
+    """Return the picture with 8 to 14 bits in a 16-bit file taken to 8 bits, else as it is."""
+    deep = _decode(data, _AS_STORED | cv2.IMREAD_ANYDEPTH)
+    if deep is None or deep.dtype != np.uint16:
+        return image
+    most = int(deep.max(initial=0))
+    bits = next((b for b in _SENSOR_BITS if most < 1 << b), 16)
+    return np.asarray(deep >> (bits - 8), dtype=np.uint8)
 
 
 def write_image(path: Path, image: Image) -> None:
@@ -181,9 +200,13 @@ def tag_bits(name: str, number: int) -> NDArray[np.bool_]:
     return np.asarray(cv2.aruco.generateImageMarker(family, number, cells)) < 128
 
 
-def charuco_board(columns: int, rows: int, square: float, marker: float, name: str) -> CharucoBoard:
-    """Return a ChArUco board of columns x rows squares."""
-    return cv2.aruco.CharucoBoard((columns, rows), square, marker, dictionary(name))
+def charuco_board(
+    columns: int, rows: int, square: float, marker: float, name: str, *, old: bool = False
+) -> CharucoBoard:
+    """Return a ChArUco board of columns x rows squares, `old` for the pattern before OpenCV 4.6."""
+    board = cv2.aruco.CharucoBoard((columns, rows), square, marker, dictionary(name))
+    board.setLegacyPattern(old)
+    return board
 
 
 def detect_charuco(board: CharucoBoard, image: Image, enlarge: int = 1) -> tuple[Ids, Array]:
@@ -249,6 +272,17 @@ def project(lens: Array, place: Array, board_points: Array) -> Array:
     matrix, dist = _split(lens)
     px, _ = cv2.projectPoints(board_points, place[:3], place[3:], matrix, dist)
     return points(px)
+
+
+def plane_map(points_xy: Array, px: Array) -> Array:
+    """Return the (3, 3) projective map from points of a plane, (N, 2), to pixels, (N, 2)."""
+    matrix, _ = cv2.findHomography(points_xy, px)
+    return np.eye(3) if matrix is None else np.asarray(matrix, dtype=np.float64)
+
+
+def mapped(matrix: Array, points_xy: Array) -> Array:
+    """Return points of a plane, (N, 2), under a projective map."""
+    return points(cv2.perspectiveTransform(points_xy.reshape(1, -1, 2), matrix))
 
 
 def rotation(vector: ArrayLike) -> Array:

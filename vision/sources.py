@@ -24,8 +24,10 @@ from numpy.typing import NDArray
 
 from hil.core.errors import BadInput, RigFault
 from hil.core.rig import Frame
+from hil.core.wording import past
 from vision import cv_compat
 from vision.frame_queue import FrameQueue
+from vision.video_file import VideoFile as VideoFile  # noqa: PLC0414 - beside the other sources
 
 Image = NDArray[np.uint8]
 
@@ -35,7 +37,6 @@ SETTLE_FRAMES = 20
 STALE_FRAMES_MAX = 10
 # Driver stamps are believed when they lie this close before the time at which grab returned.
 STAMP_AGE_MAX_S = 1.0
-FRAMES_TABLE = "frames.parquet"
 
 
 class Capture(Protocol):
@@ -193,8 +194,8 @@ class LiveCamera:
         silence_s = self._clock() - self._newest_s
         if frame is None and silence_s > self._limit_s:
             raise RigFault(
-                f"{self.name}: no frame for {silence_s:.2f} s, limit {self._limit_s:g} s; check the"
-                " cable, and that exposure fits the frame rate"
+                f"{self.name}: no frame for {past(silence_s, self._limit_s, '.2f')} s, limit"
+                f" {self._limit_s:g} s; check the cable, and that exposure fits the frame rate"
             )
         return frame
 
@@ -211,73 +212,6 @@ class LiveCamera:
         if not self._thread.is_alive():
             self._capture.release()
         self._queue.close()
-
-
-class VideoFile:
-    """The frames of a video with their stamps.
-
-    Stamps come from `frames.parquet` beside the file (a run record), else from the container.
-    """
-
-    def __init__(self, path: Path) -> None:
-        if not path.is_file():
-            raise BadInput(f"{path}: no such video file")
-        self.path = path
-        self._capture = cv2.VideoCapture(str(path))
-        if not self._capture.isOpened():
-            raise BadInput(
-                f"{path}: not a video OpenCV can read, or cut off before its first frame"
-            )
-        self.width_px = round(self._capture.get(cv2.CAP_PROP_FRAME_WIDTH))
-        self.height_px = round(self._capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
-        rate_hz = self._capture.get(cv2.CAP_PROP_FPS)
-        self.rate_hz = rate_hz if 0.0 < rate_hz < 1e4 else 30.0
-        self._stamps = _recorded_stamps(path)
-        announced = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
-        self.count = len(self._stamps) or max(0, announced)
-
-    def frames(self) -> Iterator[Frame]:
-        """Yield every frame; raises BadInput at the end of a file that holds less than it says."""
-        index, previous_s = 0, -math.inf
-        while True:
-            done, image = self._capture.read()
-            if not done or image is None:
-                break
-            stamp_s = self._stamp_s(index)
-            if stamp_s <= previous_s:
-                stamp_s = previous_s + 1.0 / self.rate_hz
-            previous_s = stamp_s
-            yield Frame(index, stamp_s, np.asarray(image, dtype=np.uint8))
-            index += 1
-        # Containers announce their length to a frame or so.
-        if index < self.count - 1 or index == 0:
-            raise BadInput(
-                f"{self.path}: cut off: {index} of {self.count or 'some'} frames can be read"
-                f" ({max(0.0, previous_s):.2f} s); copy it again, or cut it there yourself"
-            )
-
-    def _stamp_s(self, index: int) -> float:
-        if index < len(self._stamps):
-            return self._stamps[index]
-        return float(self._capture.get(cv2.CAP_PROP_POS_MSEC)) * 1e-3
-
-    def close(self) -> None:
-        """Release the file."""
-        self._capture.release()
-
-
-def _recorded_stamps(video: Path) -> list[float]:
-    """Return the camera stamps that a run record keeps beside its video; none elsewhere."""
-    table = video.with_name(FRAMES_TABLE)
-    if not table.is_file():
-        return []
-    import pyarrow.parquet  # noqa: PLC0415 - only for videos of run records
-
-    try:
-        column = pyarrow.parquet.read_table(table, columns=["t_cam_s"]).column("t_cam_s")
-    except (OSError, pyarrow.ArrowException, KeyError) as error:
-        raise BadInput(f"{table}: cannot be read: {error}") from None
-    return [float(value) for value in column.to_pylist()]
 
 
 def image_files(folder: Path) -> list[Path]:
@@ -302,6 +236,7 @@ class ImageFolder:
         self.path = folder
         self.files = image_files(folder)
         self.rate_hz = rate_hz
+        self.unstamped = 0
         self.count = len(self.files)
         first = cv_compat.read_image(self.files[0])
         self.height_px, self.width_px = first.shape[:2]

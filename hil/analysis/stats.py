@@ -1,76 +1,74 @@
 """Paired differences with their intervals: how much better, and how sure (docs/statistics.md).
 
 Two arms of an experiment that share seeds are compared seed by seed, so that what both met alike
-(noise, delays, losses) cancels. All differences are other - baseline. The intervals are scipy's:
-Student's t, and the bias-corrected and accelerated bootstrap (BCa), which does not take the
-differences to be normal. Nothing here draws an unseeded number.
+(noise, delays, losses) cancels. All differences are other - baseline. The intervals are those of
+hil/analysis/intervals.py. Nothing here draws an unseeded number.
 """
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import stats
 
+from hil.analysis.intervals import (
+    CONFIDENCE,
+    UNKNOWN,
+    Coverage,
+    Interval,
+    by_group,
+    coverage_of,
+    crossed_interval,
+    mean_interval,
+    median_interval,
+    share_interval,
+)
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
-CONFIDENCE = 0.95
-_RESAMPLES = 5_000
-# Below this the bootstrap has too few different resamples to say anything about the tails.
-_LEAST_FOR_BOOTSTRAP = 6
-_SEED = 8_10_4
-
-
-@dataclass(frozen=True, slots=True)
-class Interval:
-    """A 95 % interval; NaN where there are too few values."""
-
-    low: float
-    high: float
-
-    @property
-    def contains_zero(self) -> bool:
-        """Say whether no difference is among what the interval allows (also when it is unknown)."""
-        return not (self.low > 0.0 or self.high < 0.0)
-
-
-UNKNOWN = Interval(math.nan, math.nan)
+# Differences that are equal up to this share of the values themselves are equal but for rounding.
+_ROUNDING = 1e-12
+# Names of what a pair has in common with others: its seed, and its draw of random values.
+Tape = tuple[Hashable, Hashable]
 
 
 @dataclass(frozen=True, slots=True)
 class Paired:
     """Differences other - baseline over `pairs` pairs; `left_out` pairs lacked a finite value.
 
-    `effect` is Hedges' g_z: the mean difference over the standard deviation of the differences,
-    corrected for small samples; infinite when every pair differs alike. `lower_share` is the share
-    of pairs in which the other is lower, ties counted half. `rank_p` is Wilcoxon's signed-rank p.
+    `tapes` counts what the intervals rest on: pairs, or where several pairs met one seed (or one
+    draw) the seeds, or of seeds and draws the fewer. `interval` is that of the mean, and `coverage`
+    how often such an interval was measured to hold it; `median_interval` is that of the median over
+    the tapes, which holds it in `median_coverage` of all studies however the differences are
+    distributed. `effect` is Hedges' g_z: the mean difference over the standard
+    deviation of the differences, corrected for small samples; infinite when every pair differs
+    alike. `lower_share` is the share of pairs in which the other is lower, ties counted half.
+    `rank_p` is Wilcoxon's signed-rank p, over the tapes.
     """
 
     pairs: int
     left_out: int
+    tapes: int
     baseline_mean: float
     other_mean: float
     mean: float
     median: float
     sd: float
-    t: Interval
-    bca: Interval
+    interval: Interval
+    median_interval: Interval
+    median_coverage: float
+    coverage: Coverage | None
     effect: float
     lower_share: float
     rank_p: float
-
-    @property
-    def interval(self) -> Interval:
-        """Return the interval to quote: BCa, or t where there are too few pairs for it."""
-        return self.t if math.isnan(self.bca.low) else self.bca
 
     @property
     def certain(self) -> bool:
@@ -80,65 +78,121 @@ class Paired:
     def to_json(self) -> dict[str, Any]:
         """Return the comparison for a JSON document, what is not finite as null."""
         tree = asdict(self)
-        for name in ("t", "bca"):
-            tree[f"{name}_95"] = [_finite(value) for value in tree.pop(name).values()]
+        ends = {
+            "interval_95": tree.pop("interval"),
+            "median_interval": tree.pop("median_interval"),
+        }
         plain = {k: _finite(v) if isinstance(v, float) else v for k, v in tree.items()}
+        plain |= {name: [_finite(value) for value in end.values()] for name, end in ends.items()}
         return plain | {"contains_zero": self.interval.contains_zero}
 
 
-def paired(baseline: Sequence[float], other: Sequence[float]) -> Paired:
-    """Compare two arms pair by pair (same length, same order); needs 2 pairs for an interval."""
+def paired(
+    baseline: Sequence[float],
+    other: Sequence[float],
+    tapes: Sequence[Tape] | None = None,
+    *,
+    shares: bool = False,
+) -> Paired:
+    """Compare two arms pair by pair (same length, same order); needs 2 tapes for an interval.
+
+    `tapes` names each pair's seed and draw, where pairs have some in common: then these are what
+    was drawn at random, and not the pairs. `shares`: every value is 0 or 1.
+    """
     one, two = np.asarray(baseline, np.float64), np.asarray(other, np.float64)
     known = np.isfinite(one) & np.isfinite(two)
     left_out = int(known.size - known.sum())
     one, two = one[known], two[known]
-    difference = two - one
-    if difference.size == 0:
-        return Paired(0, left_out, *(math.nan,) * 5, UNKNOWN, UNKNOWN, *(math.nan,) * 3)
+    if one.size == 0:
+        return Paired(
+            0, left_out, 0, *(math.nan,) * 5, UNKNOWN, UNKNOWN, math.nan, None, *(math.nan,) * 3
+        )
+    difference = _without_rounding(one, two)
+    chosen = [tape for tape, here in zip(tapes, known, strict=True) if here] if tapes else []
+    found = _of_tapes(difference, chosen) if tapes else _OfMean.of(difference)
+    interval = _of_shares(found, one, two) if shares else found.interval
+    median, median_holds = UNKNOWN, math.nan
+    if not found.crossed:
+        median, median_holds = median_interval(found.own)
     spread = float(difference.std(ddof=1)) if difference.size > 1 else math.nan
+    spread = 0.0 if spread > 0.0 and np.ptp(difference) == 0.0 else spread
     return Paired(
         pairs=int(difference.size),
         left_out=left_out,
+        tapes=int(found.own.size),
         baseline_mean=float(one.mean()),
         other_mean=float(two.mean()),
         mean=float(difference.mean()),
         median=float(np.median(difference)),
         sd=spread,
-        t=t_interval(difference),
-        bca=bca_interval(difference),
+        interval=interval,
+        median_interval=median,
+        median_coverage=median_holds,
+        coverage=coverage_of(found.own.size) if found.measured and not shares else None,
         effect=_hedges(difference, spread),
         lower_share=float((difference < 0).mean() + 0.5 * (difference == 0).mean()),
-        rank_p=_rank_p(difference),
+        rank_p=_rank_p(found.own),
     )
 
 
-def t_interval(values: Array) -> Interval:
-    """Return Student's 95 % interval of the mean."""
-    if values.size < 2:
-        return UNKNOWN
-    mean, error = float(values.mean()), float(stats.sem(values))
-    if error == 0.0:
-        return Interval(mean, mean)
-    low, high = stats.t.interval(CONFIDENCE, values.size - 1, loc=mean, scale=error)
-    return Interval(float(low), float(high))
+def level(values: Sequence[float], tapes: Sequence[Tape]) -> tuple[float, Interval]:
+    """Return the mean of one arm's known values and its 95 % interval; `tapes` as of `paired`."""
+    found = np.asarray(values, np.float64)
+    known = np.isfinite(found)
+    if not known.any():
+        return math.nan, UNKNOWN
+    chosen = [tape for tape, here in zip(tapes, known, strict=True) if here]
+    return float(found[known].mean()), _of_tapes(found[known], chosen).interval
 
 
-def bca_interval(values: Array) -> Interval:
-    """Return the BCa bootstrap's 95 % interval of the mean, the same for the same values."""
-    if values.size < _LEAST_FOR_BOOTSTRAP:
+def _without_rounding(one: Array, two: Array) -> Array:
+    """Return two - one; differences that rounding alone tells apart are made equal."""
+    difference = two - one
+    rounding = _ROUNDING * float(max(np.abs(one).max(), np.abs(two).max()))
+    if float(np.ptp(difference)) <= rounding:
+        mean = float(difference.mean())
+        return np.full_like(difference, 0.0 if abs(mean) <= rounding else mean)
+    return difference
+
+
+@dataclass(frozen=True, slots=True)
+class _OfMean:
+    """The interval of a mean, and one value for each independent tape that it rests on."""
+
+    interval: Interval
+    own: Array
+    crossed: bool = False
+
+    @classmethod
+    def of(cls, own: Array) -> _OfMean:
+        return cls(mean_interval(own), own)
+
+    @property
+    def measured(self) -> bool:
+        return not self.crossed and self.own.size >= 2
+
+
+def _of_tapes(values: Array, tapes: Sequence[Tape]) -> _OfMean:
+    """Return the mean's interval where pairs share seeds or draws."""
+    seeds, draws = [tape[0] for tape in tapes], [tape[1] for tape in tapes]
+    several = [names for names in (seeds, draws) if len(set(names)) > 1]
+    if not several:
+        return _OfMean.of(values[:1])
+    fewer = by_group(values, min(several, key=lambda names: len(set(names))))
+    if len(several) == 1:
+        return _OfMean.of(fewer)
+    return _OfMean(crossed_interval(values, seeds, draws), fewer, crossed=True)
+
+
+def _of_shares(found: _OfMean, one: Array, two: Array) -> Interval:
+    """Return the interval where values are 0 or 1: that none of a few runs fails proves little."""
+    if math.isnan(found.interval.low):
         return UNKNOWN
-    if np.ptp(values) == 0.0:
-        return Interval(float(values[0]), float(values[0]))
-    found = stats.bootstrap(
-        (values,),
-        np.mean,
-        confidence_level=CONFIDENCE,
-        n_resamples=_RESAMPLES,
-        method="BCa",
-        vectorized=True,
-        rng=np.random.default_rng(_SEED),
-    ).confidence_interval
-    return Interval(float(found.low), float(found.high))
+    share = share_interval(one, two)
+    if found.own.size == one.size:
+        return share
+    low, high = min(found.interval.low, share.low), max(found.interval.high, share.high)
+    return Interval(low, high)
 
 
 def _hedges(difference: Array, spread: float) -> float:

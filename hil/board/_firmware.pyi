@@ -67,7 +67,7 @@ class Scheme(enum.Enum):
     IMPLICIT = 2
 
 class SuperTwisting:
-    """Super-twisting differentiator of control.md section 3 for a signal with |x_ddot| <= l.
+    """Super-twisting differentiator of docs/wheel-loop.md for a signal with |x_ddot| <= l.
 
     `cell` is the half width of the measurement's quantisation cell, in units of x. With `l_min` the
     gain varies between l_min and l as in (3.15).

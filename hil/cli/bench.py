@@ -18,14 +18,14 @@ from hil.cli.options import json_option, print_json
               help="wheels: search the gains of both laws, that many candidates each.")  # fmt: skip
 @json_option
 def command(what: str, runs: int, candidates: int | None, as_json: bool) -> None:
-    r"""Measure the speed of the harness, or compare the wheel laws of the board.
+    """Measure the speed of the harness, or compare the wheel laws of the board.
 
     \b
-    speed   medians of several runs, with least and largest
-    wheels  both wheel laws at step, ramp, crawl, turn, load, friction and battery sag
-    vision  the colour marks on rendered sequences with known truth; some minutes
-    firmware  what the sketch costs the Mega 2560: cycles by part of the tick, load, memory
-    """
+    speed     medians of several runs, with least and largest
+    wheels    both wheel laws at step, ramp, crawl, turn, load, friction, battery sag
+    vision    the colour marks on rendered sequences of known truth; some minutes
+    firmware  what the sketch costs the Mega 2560: cycles by part, load, memory
+    """  # noqa: D301 - \b is click's mark for a verbatim paragraph
     if what == "speed" and candidates is not None:
         raise click.UsageError("--tune: the wheels have gains, the speed figures have none")
     if candidates is not None:

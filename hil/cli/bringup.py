@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hil.cli.options import json_option, print_json
-from hil.core.errors import BadInput
+from hil.core.errors import BadInput, RigFault
 from hil.core.text import visible
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from hil.tools.bringup.result import Check, Report, Side
     from hil.tools.bringup.wiring import Seen
 
+_KEYS = "lf, lb, rf, rb, n, ?"
 _SEEN = "[lf] left forward, [lb] left backward, [rf] right forward, [rb] right backward, [n] none"
 
 
@@ -57,6 +58,7 @@ def command(
     device, baud = parse_target(target)
     if out is not None:
         check_out(out, robot)
+    _require_port(device)
     if not yes:
         _confirm()
     report = _run(device, baud, believed, 0.0 if yes else turns, yes)
@@ -73,6 +75,12 @@ def command(
             err=True,
         )
     return 0 if report.passed else 1
+
+
+def _require_port(device: str) -> None:
+    """Raise RigFault for a port that is not there, before anybody is asked anything."""
+    if device.startswith("/") and not Path(device).exists():
+        raise RigFault(f"port {device}: no such port; `hil doctor` lists the ports")
 
 
 def _run(device: str, baud: int, believed: RobotConfig, turns: float, yes: bool) -> Report:
@@ -116,6 +124,10 @@ def _ask(question: str) -> str:
     raise BadInput("bringup asks what the wheels do: run it in a terminal, or with --yes")
 
 
+def _told(answer: str) -> str:
+    return repr(answer) if answer else "an empty line"
+
+
 def _confirm() -> None:
     answer = _ask("The wheels will turn, up to full speed. Are ALL of them off the ground? [y/N]")
     if answer not in {"y", "yes"}:
@@ -142,6 +154,7 @@ class Person:
             answer = _ask(f"{driven} was driven. Which wheels turned? {_SEEN}, [?] not seen:")
             if answer in sides:
                 return sides[answer]
+            click.echo(f"{_told(answer)} is none of them; type one of {_KEYS}", err=True)
 
     def turns(self, side: Side, believed: float) -> float | None:
         """Ask for the number of turns counted."""
@@ -155,6 +168,7 @@ class Person:
             with suppress(ValueError):
                 if float(answer) > 0.0:
                     return float(answer)
+            click.echo(f"{_told(answer)} is no number of turns; type it, or ?", err=True)
 
 
 class Nobody:

@@ -1,4 +1,4 @@
-"""The commands `hil calibrate board|camera|floor|colours`."""
+"""The commands `hil calibrate board|marks|camera|floor|colours|latency`."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from hil.cli.calibrate_print import FILE, board, board_option, marks
 from hil.cli.options import json_option, print_json
 from hil.core.errors import BadInput
 from vision.camera_setup import camera_model
@@ -18,16 +19,6 @@ if TYPE_CHECKING:
     from vision.calibration.points import PointPairs
     from vision.calibration.views import Views
 
-FILE = click.Path(path_type=Path)
-BOARD = "charuco:8x6:30:22"
-LENS_HELD_OUT_MAX_PX = 1.0
-FLOOR_HELD_OUT_MAX_MM = 20.0
-
-board_option = click.option(
-    "--board", "board_text", default=BOARD, show_default=True, metavar="BOARD",
-    help="charuco:COLUMNSxROWS:SQUARE_MM:MARKER_MM or chess:COLUMNSxROWS:SQUARE_MM, in squares; "
-    "sizes as measured on the print.",
-)  # fmt: skip
 detector_option = click.option(
     "--detector", type=click.Choice(["sector", "classic"]), default="sector", show_default=True,
     help="Chessboard corners: sector fits the checker pattern, classic the gradients.",
@@ -46,27 +37,15 @@ def command() -> None:
 
     \b
     hil calibrate board --out board.pdf
+    hil calibrate marks --out marks.pdf
     hil calibrate camera images/ --camera-file lab.toml
     hil calibrate floor floor.png --board charuco:8x6:30:22 --camera-file lab.toml
     hil calibrate colours robot.png --front 312,207 --rear 355,240 --camera-file lab.toml
     """  # noqa: D301 - \b is click's mark for a verbatim paragraph
 
 
-@command.command()
-@board_option
-@click.option("--paper", default="a4", show_default=True, help="a4, a3, a2, letter or fit.")
-@click.option("--out", type=FILE, required=True, metavar="FILE", help="A .pdf or .svg to write.")
-def board(board_text: str, paper: str, out: Path) -> None:
-    """Draw a calibration board at true scale.
-
-    Print it without scaling, measure the ruler below it, glue it to something flat, and give the
-    measured sizes to the other commands.
-    """
-    from vision.calibration.boards import parse_board
-    from vision.calibration.printing import lay_out, write_sheet
-
-    write_sheet(out, lay_out(parse_board(board_text), paper, board_text))
-    click.echo(f"{out}: {board_text} on {paper}; print at 100 % and measure the ruler")
+command.add_command(board)
+command.add_command(marks)
 
 
 @command.command()
@@ -94,18 +73,13 @@ def camera(
     """
     from vision.calibration import figures, files, summary
     from vision.calibration.boards import parse_board
-    from vision.calibration.intrinsics import calibrate_lens
+    from vision.calibration.intrinsics import VIEWS_MIN, calibrate_lens
     from vision.cv_compat import PICTURE_SUFFIXES, require_place, write_image
 
     require_place(camera_file)
     require_place(picture, PICTURE_SUFFIXES)
     views = _views(source, parse_board(board_text, detector), wanted)
-    result = calibrate_lens(views.views, views.size_px)
-    if not result.held_out_px <= LENS_HELD_OUT_MAX_PX:
-        raise BadInput(
-            f"lens: {result.held_out_px:.2f} px RMS on held-out views, limit"
-            f" {LENS_HELD_OUT_MAX_PX:g} px; nothing written: is the board flat and held still?"
-        )
+    result = calibrate_lens(views.require(VIEWS_MIN).views, views.size_px)
     files.update_camera(camera_file, files.lens_tables(result))
     if picture is not None:
         write_image(picture, figures.coverage_picture(result))
@@ -180,7 +154,7 @@ def floor(
     --board, --fiducials and --points.
     """
     from vision.calibration import figures, files, summary, views
-    from vision.calibration.floor import FloorOptions, calibrate_floor
+    from vision.calibration.floor import FloorOptions, calibrate_floor, require_fit
     from vision.cv_compat import PICTURE_SUFFIXES, require_place, write_image
 
     require_place(picture, PICTURE_SUFFIXES)
@@ -192,11 +166,7 @@ def floor(
     size_px, lens = _lens_for(camera_file, fit_lens, images)
     pairs = _pairs(images, board_text, places, (fiducials, dictionary), points)
     result = calibrate_floor(pairs, size_px, FloorOptions(lens, height_m, degree))
-    if result.held_out_rms_mm > FLOOR_HELD_OUT_MAX_MM:
-        raise BadInput(
-            f"floor: {result.held_out_rms_mm:.1f} mm RMS on held-out points, limit"
-            f" {FLOOR_HELD_OUT_MAX_MM:g} mm; nothing written: check sizes, places and units"
-        )
+    require_fit(result)
     tables = files.floor_tables(result, with_lens=lens is None)
     config = files.update_camera(camera_file, tables)
     if picture is not None:
@@ -248,7 +218,7 @@ def _pairs(
     points: Path | None,
 ) -> PointPairs:
     """Return the world-image pairs by whichever method was asked for."""
-    from vision.calibration.boards import parse_board
+    from vision.calibration.boards import not_seen_hint, parse_board
     from vision.calibration.points import (
         PointPairs,
         pairs_of_board,
@@ -272,7 +242,13 @@ def _pairs(
     for k, (name, image) in enumerate(images):
         view = known.find(image, name)
         if view is None:
-            raise BadInput(f"{name}: board {board_text} not seen; is it whole, flat and in focus?")
+            hint = not_seen_hint(known, image) or "; is it whole, flat and in focus?"
+            raise BadInput(f"{name}: board {board_text} not seen{hint}")
+        if view.fault:
+            raise BadInput(
+                f"{name}: another board than {board_text}: {view.fault}; count its squares, not its"
+                " corners"
+            )
         parts.append(pairs_of_board(known, view, where[k if len(where) > 1 else 0]))
     return PointPairs.joined(parts)
 

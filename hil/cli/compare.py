@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hil.cli.options import json_option, print_json
+from hil.cli.options import figures_option, json_option, print_json
 from hil.core.text import visible
 
 if TYPE_CHECKING:
@@ -22,12 +22,14 @@ if TYPE_CHECKING:
               metavar="FILE.csv", help="Write every run's figures as CSV.")  # fmt: skip
 @click.option("--rerun", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.rrd",
               help="Write all runs as one recording for the viewer, on a common timeline.")  # fmt: skip
+@figures_option
 @json_option
 def command(
     runs: tuple[Path, ...],
     report: Path | None,
     csv_file: Path | None,
     rerun: Path | None,
+    figures: Path | None,
     as_json: bool,
 ) -> int:
     """Compare two or more run records of one scenario.
@@ -38,15 +40,19 @@ def command(
     from hil.record.manifest import command_line
     from hil.record.reader import read_run
     from hil.report.csv_table import write_csv
-    from hil.report.html import write_report
+    from hil.report.html import render, write_report
+    from hil.report.paper import figures_kept
     from hil.runs.execute import judged_status
     from hil.study.experiment import study
 
     records = [read_run(run) for run in runs]
     found = study(records)
-    if report is not None:
-        repeats = [found.repeats] if found.repeats else []
-        write_report(report, [found.comparison], command=command_line(), repeats=repeats)
+    repeats = [found.repeats] if found.repeats else []
+    with figures_kept(figures):
+        if report is not None:
+            write_report(report, [found.comparison], command=command_line(), repeats=repeats)
+        elif figures is not None:
+            render([found.comparison], command=command_line(), repeats=repeats)
     if csv_file is not None:
         write_csv(csv_file, records)
     if rerun is not None:
@@ -57,8 +63,14 @@ def command(
         print_json(found.to_json())
         return judged_status(records)
     print_study(found)
-    if report is not None:
-        click.echo(f"report: {visible(str(report))}")
+    for name, path in (
+        ("report", report),
+        ("csv", csv_file),
+        ("rerun", rerun),
+        ("figures", figures),
+    ):
+        if path is not None:
+            click.echo(f"{name}: {visible(str(path))}")
     return judged_status(records)
 
 

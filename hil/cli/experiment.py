@@ -10,12 +10,14 @@ from hil.cli.compare import print_study
 from hil.cli.options import (
     INNER_LAWS,
     camera_option,
+    figures_option,
     json_option,
     out_option,
     print_json,
     seed_option,
     set_option,
     target_option,
+    warn_unfinished,
 )
 from hil.cli.progress import run_progress
 from hil.core.text import visible
@@ -32,6 +34,7 @@ from hil.core.text import visible
 @seed_option
 @set_option
 @out_option
+@figures_option
 @json_option
 def command(
     deck: str,
@@ -42,6 +45,7 @@ def command(
     seed: int,
     overrides: tuple[str, ...],
     out: Path | None,
+    figures: Path | None,
     as_json: bool,
 ) -> int:
     """Run every scenario of DECK with both laws and write one report.
@@ -50,41 +54,47 @@ def command(
     `laws`. Both laws of a scenario get the same seeds: the same noise, delays and losses. With
     --repeats the report gives paired differences with 95 % intervals.
 
-    The same command with the same --out takes an interrupted experiment up where it stopped.
+    The same command with the same --out takes an interrupted experiment up where it stopped; a run
+    that was cut off, or whose record is damaged, is moved to set-aside/ and done anew.
     """
     from hil.config.deck import load_deck
     from hil.record.manifest import command_line
     from hil.record.reader import read_run
     from hil.report.html import write_report
+    from hil.report.paper import figures_kept
     from hil.runs.execute import exit_status, new_folder
     from hil.study.experiment import (
+        REPORT,
         Conditions,
         circle_study,
         claim,
         deck_specs,
-        run_all,
-        run_name,
         study_by_scenario,
+        writing,
     )
+    from hil.study.side_by_side import run_all, run_name
 
     conditions = Conditions(target, camera, inner, seed, repeats, overrides, command_line())
     folder = out or new_folder("experiment")
     specs = deck_specs(load_deck(deck), conditions, folder)
-    todo = claim(folder, specs)
-    if len(todo) < len(specs):
-        click.echo(f"{len(specs) - len(todo)} of {len(specs)} runs are there already", err=True)
-    with run_progress({run_name(spec): spec.scenario.duration_s for spec in todo}) as update:
-        run_all(todo, update)
+    warn_unfinished({spec.scenario.name: spec.scenario for spec in specs}.values())
+    with writing(folder):
+        todo = claim(folder, specs, _say)
+        if len(todo) < len(specs):
+            _say(f"{len(specs) - len(todo)} of {len(specs)} runs are there already")
+        with run_progress({run_name(spec): spec.scenario.duration_s for spec in todo}) as update:
+            run_all(todo, update)
     records = [read_run(spec.out) for spec in specs]
-    report = folder / "report.html"
+    report = folder / REPORT
     studies = study_by_scenario(records)
-    write_report(
-        report,
-        [item.comparison for item in studies],
-        command=conditions.command,
-        circle=circle_study(),
-        repeats=[item.repeats for item in studies if item.repeats],
-    )
+    with figures_kept(figures):
+        write_report(
+            report,
+            [item.comparison for item in studies],
+            command=conditions.command,
+            circle=circle_study(),
+            repeats=[item.repeats for item in studies if item.repeats],
+        )
     if as_json:
         print_json({"report": str(report), "comparisons": [item.to_json() for item in studies]})
     else:
@@ -92,3 +102,7 @@ def command(
             print_study(item)
         click.echo(f"report: {visible(str(report))}")
     return max(exit_status(record) for record in records)
+
+
+def _say(text: str) -> None:
+    click.echo(visible(text), err=True)

@@ -17,6 +17,8 @@ FILE = click.Path(path_type=Path)
               help="The calibration of the camera the video is from.")  # fmt: skip
 @click.option("--tag", "tag_text", metavar="ID:SIZE_MM",
               help="Find a 4x4 ArUco tag on the plate in place of the colour marks.")  # fmt: skip
+@click.option("--rate", "rate_hz", type=click.FloatRange(0.01, 1000.0), metavar="HZ",
+              help="Take a folder of images as a video of this rate. [default: as stills]")  # fmt: skip
 @click.option("--out", type=FILE, metavar="CSV", help="One row per frame.")
 @click.option("--overlay", type=FILE, metavar="VIDEO",
               help="The frames with the poses drawn in: .avi or .mkv.")  # fmt: skip
@@ -25,6 +27,7 @@ def command(
     source: Path,
     camera_file: Path,
     tag_text: str | None,
+    rate_hz: float | None,
     out: Path | None,
     overlay: Path | None,
     as_json: bool,
@@ -32,11 +35,12 @@ def command(
     """Run a video, or a folder of images, through localisation alone.
 
     Says in how many frames the robot was seen, why not in the others, and how well it fitted.
+    The images of a folder are stills, each localised for itself, unless --rate is given.
     A video that is cut off in mid-frame is refused, and nothing is written.
     """
     from hil.tools.localise import Outputs, localise, summary_text
 
-    document = localise(source, camera_file, tag_text, Outputs(out, overlay))
+    document = localise(source, camera_file, tag_text, Outputs(out, overlay), rate_hz)
     if as_json:
         print_json(document)
     else:

@@ -27,6 +27,10 @@ COMMANDS = {
     "import": ("hil.cli.importing", "Make a record of a MAVLink .tlog or a CSV file."),
     "view": ("hil.cli.view", "Open recorded runs in the viewer."),
     "sweep": ("hil.cli.sweep", "Run a campaign over grids, lists and distributions; draw maps."),
+    "reproduce": (
+        "hil.cli.reproduce",
+        "Reproduce the thesis's numerical studies, chapters 4 to 8; judge its claims.",
+    ),
     "tune": ("hil.cli.tune", "Tune the gains of both laws by one procedure and budget."),
     "faults": ("hil.cli.faults", "Break everything once: each fault at each instant."),
     "twin": ("hil.cli.twin", "Serve the digital twin to other programs."),

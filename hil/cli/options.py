@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -11,6 +11,8 @@ import click
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from hil.config.scenario import Scenario
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -45,6 +47,11 @@ out_option = click.option(
     "--out", type=click.Path(path_type=Path), metavar="DIR",
     help="Folder for the record(s); must not exist or be empty. [default: a new one in runs/]",
 )  # fmt: skip
+figures_option = click.option(
+    "--figures", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
+    help="Also write each figure of the report as SVG, PDF and PNG, one and two columns wide, with "
+    "its data as CSV.",
+)  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True,
                            help="One JSON document on stdout, nothing else.")  # fmt: skip
 
@@ -59,3 +66,13 @@ def plain_console() -> Console:
 def print_json(document: dict[str, Any]) -> None:
     """Write one JSON document to stdout."""
     click.echo(json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False))
+
+
+def warn_unfinished(scenarios: Iterable[Scenario]) -> None:
+    """Say on stderr where a run would end before its reference does."""
+    from hil.control.references import unfinished
+
+    for scenario in scenarios:
+        told = unfinished(scenario.reference, scenario.duration_s)
+        if told is not None:
+            click.echo(f"note: {scenario.name}: {told}", err=True)

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 @click.option("--elf", is_flag=True,
               help="As --firmware, through the board's own binary on a simulated processor.")  # fmt: skip
 @click.option("--fit", is_flag=True,
-              help="Also fit a twin to RUN and run the other law on it, in closed loop.")  # fmt: skip
+              help="Also fit a twin to RUN and run another law on it, in closed loop: that of --outer, "
+              "--inner and --set, else the other outer law.")  # fmt: skip
 @set_option
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
               help="Folder for replay.json and replayed.parquet; must not exist or be empty.")  # fmt: skip
@@ -63,7 +64,8 @@ def command(
     from hil.replays.output import claim_folder, write_output
     from hil.replays.what_if import what_if
 
-    duration_s = float(read_manifest(run).scenario.get("duration_s", 0.0))
+    told = read_manifest(run).scenario.get("duration_s")
+    duration_s = float(told) if isinstance(told, int | float) else 0.0  # for the bar; replay checks
     through = elf_firmware() if elf else core()
     if out is not None:
         claim_folder(out)
@@ -78,7 +80,7 @@ def command(
     board_changes = [text for text in overrides if text.startswith("board.")]
     asked = firmware or elf or inner or board_changes
     wheels = replay_wheels(run, inner, board_changes, through) if asked else None
-    answer = what_if(run, outer, overrides) if fit else None
+    answer = what_if(run, outer, overrides, inner=inner) if fit else None
     document = report.to_json() | {
         "firmware": wheels.to_json() if wheels else None,
         "fitted_twin": answer.to_json() if answer else None,
@@ -110,6 +112,9 @@ def print_report(report: ReplayReport) -> None:
     for problem in report.problems:
         console.print(f"note: {visible(problem)}")
     console.print(visible(headline(report)))
+    if report.kind == "shadow":
+        console.print(visible("\n".join(shadow_lines(report))))
+        return
     different = [channel for channel in report.channels if not channel.same]
     if not different:
         return
@@ -121,6 +126,29 @@ def print_report(report: ReplayReport) -> None:
             console.print(f"  {channel.text()}")
     same = ", ".join(channel.name for channel in report.channels if channel.same)
     console.print(f"identical: {same or 'no channel'}")
+
+
+def shadow_lines(report: ReplayReport) -> list[str]:
+    """Return how far apart the commands of the two laws are, in their units; the rest is counted."""
+    from hil.record.schema import SAMPLE_COLUMNS
+    from hil.replays.exact import COMMANDS
+
+    columns = {column.name: column for column in SAMPLE_COLUMNS}
+    by_name = {channel.name: channel for channel in report.channels}
+    lines = []
+    for name in COMMANDS:
+        channel, unit = by_name[name], columns[name].unit
+        apart = (
+            "the same in every row"
+            if channel.same
+            else f"{channel.rms:.3g} {unit} apart (RMS), {channel.largest:.3g} {unit} at most, first "
+            f"at t = {channel.first_s:.3f} s"
+        )
+        lines.append(f"  {columns[name].meaning}: {apart}")
+    others = [c for c in report.channels if c.name not in COMMANDS and not c.same]
+    if others:
+        lines.append(f"  {len(others)} further channels differ; --json or --out DIR has them all")
+    return lines
 
 
 def headline(report: ReplayReport) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from hil.cli.options import json_option, print_json
+from hil.cli.options import json_option, print_json, warn_unfinished
 from hil.core.text import visible
 
 
@@ -28,6 +28,9 @@ def command(
     Every combination of the values in [grid] and [[together]], `draws` draws of [random], `seeds`
     seeds and all laws; runs are kept in memory, one row each goes to results.parquet.
 
+    However a campaign was stopped, the same command with the same --out goes on; a row that was lost
+    with a damaged file is made again.
+
     Exit status: 0 when every run met its requirements, 1 when one did not, 3 when one ended early
     by a fault (outside the fence, robot not seen, board stopped).
     """
@@ -37,18 +40,22 @@ def command(
     from hil.study.campaign.findings import documents, outcomes_of, sentences
     from hil.study.campaign.maps import write_page
     from hil.study.campaign.plan import load_campaign
+    from hil.study.campaign.results import PAGE, early_ends, programs
     from hil.study.campaign.work import run_campaign
 
     campaign = load_campaign(file)
+    warn_unfinished([campaign.scenario(())])
     folder = out or new_folder(f"sweep-{campaign.file.name}")
     with job_progress(campaign.file.name) as update:
-        table, totals = run_campaign(campaign, folder, workers, dask, update)
+        table, totals = run_campaign(campaign, folder, workers, dask, update, _say)
+    ends, made_by = early_ends(table), programs(table)
+    notes = [*ending_lines(ends, totals.runs), *program_lines(made_by)]
+    outcomes = outcomes_of(campaign, table)
+    page = folder / PAGE
+    write_page(page, outcomes, command_line(), [*notes, *(f"Made by {name}." for name in made_by)])
     ended, kept = table["outcome"].to_pylist(), table["holds"].to_pylist()
     held, early = sum(kept), sum(outcome != "complete" for outcome in ended)
-    status = 3 if "fault" in ended else int(held < len(kept))
-    outcomes = outcomes_of(campaign, table)
-    page = folder / "report.html"
-    write_page(page, outcomes, command_line())
+    status = 3 if {"fault", "error"} & set(ended) else int(held < len(kept))
     efficiency = totals.efficiency
     document: dict[str, Any] = {
         "campaign": campaign.file.name,
@@ -62,6 +69,8 @@ def command(
         "wall_s": round(totals.wall_s, 3),
         "workers": totals.workers,
         "parallel_efficiency": round(efficiency, 4) if efficiency is not None else None,
+        "endings": ends,
+        "programs": made_by,
         "answers": list(documents(outcomes)),
     }
     if as_json:
@@ -70,7 +79,31 @@ def command(
     told = f", {efficiency:.0%} of the workers' time spent on runs" if efficiency else ""
     click.echo(f"{totals.runs} runs, {totals.runs_now} of them now in {totals.wall_s:.1f} s{told}")
     click.echo(f"{held} of {totals.runs} runs met every requirement, {early} ended early")
+    for line in notes:
+        click.echo(f"note: {visible(line)}")
     for line in sentences(outcomes):
         click.echo(f"- {visible(line)}")
     click.echo(f"results: {visible(document['results'])}\nreport: {visible(str(page))}")
     return status
+
+
+def _say(text: str) -> None:
+    click.echo(f"note: {visible(text)}", err=True)
+
+
+def ending_lines(ends: dict[str, dict[str, Any]], runs: int) -> list[str]:
+    """Return a line on each way in which runs ended without figures, with its commonest cause."""
+    how = {"fault": "ended in a fault", "refused": "were refused", "error": "failed in the program"}
+    return [
+        f"{end['runs']} of {runs} runs {how.get(outcome, f'ended {outcome}')} "
+        f"({'' if end['runs'] == 1 else 'most often: '}{end['commonest_cause']})"
+        for outcome, end in ends.items()
+    ]
+
+
+def program_lines(made_by: dict[str, int]) -> list[str]:
+    """Return a warning when the rows are not all of one program."""
+    if len(made_by) < 2:
+        return []
+    parts = ", ".join(f"{count} by {name}" for name, count in made_by.items())
+    return [f"rows of {len(made_by)} programs are mixed: {parts}; a new --out has one only"]

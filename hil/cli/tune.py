@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hil.cli.options import json_option, print_json
+from hil.cli.options import json_option, print_json, set_option
 from hil.core.text import visible
 
 if TYPE_CHECKING:
@@ -19,11 +19,16 @@ if TYPE_CHECKING:
     from hil.cli.progress import Stage
     from hil.config.gains import Gains
     from hil.core.figures import Metric
-    from hil.study.tune import Figures, Trial
+    from hil.study.tune import Figures, Plan, Trial
+    from hil.study.tune_work import Journal, Tasks
     from hil.study.tuning_verdict import Verdict
 
 
 @click.command("tune")
+@click.argument("tasks", nargs=-1, metavar="[SCENARIO...]")
+@click.option("--robot", metavar="FILE",
+              help="Robot in place of each scenario's own: a TOML file, or built in.")  # fmt: skip
+@set_option
 @click.option("--candidates", type=click.IntRange(11, 100_000), default=301, show_default=True,
               help="Candidates for each law; each runs every case with every seed.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(1, 2**31 - 1), default=1, show_default=True,
@@ -38,6 +43,9 @@ if TYPE_CHECKING:
               show_default=True, metavar="FILE", help="Where the gain set goes.")  # fmt: skip
 @json_option
 def command(
+    tasks: tuple[str, ...],
+    robot: str | None,
+    overrides: tuple[str, ...],
     candidates: int,
     seed: int,
     repeats: int,
@@ -48,52 +56,78 @@ def command(
 ) -> None:
     """Tune ASG-ISM and PID on the twin with the same budget, cases and cost (docs/control.md).
 
-    The result is a gain set with its origin. It is judged at once on a held-out tape: the three
-    scenarios with seeds no candidate has seen, both laws under the same ones. Some ten minutes of
-    two cores; a search that is interrupted leaves nothing.
+    SCENARIO... are the tasks: built-in names, TOML files, or one deck; the three scenarios of the
+    thesis when none is given. Each is run calm, pushed, late and, where it goes to a point, beside it.
+
+    The result is a gain set with its origin. It is judged at once on a held-out tape: the tasks with
+    seeds no candidate has seen, both laws under the same ones. Some ten minutes of two cores; a
+    search that is interrupted keeps its runs in FILE.search, and the same command goes on.
     """
-    from hil.cli.progress import stage_progress
-    from hil.config.control import ControlConfig
     from hil.core.errors import BadInput
-    from hil.record.manifest import git_revision
-    from hil.study.campaign.workers import Pool
-    from hil.study.tune import OnTarget, Plan, tune, write_gain_set
-    from hil.study.tuning_verdict import held_out_trials, judge, with_verdict
+    from hil.study.campaign.results import program
+    from hil.study.tune import Plan, write_gain_set
+    from hil.study.tune_work import Journal, identity_of, load_tasks
+    from hil.study.work_folder import sigterm_stops, sole_writer
 
     if out.exists():
         raise BadInput(f"--out {out}: exists already; name a new file")
     if not os.access(out.absolute().parent, os.W_OK):
         raise BadInput(f"--out {out}: no folder {out.absolute().parent} that can be written to")
-    plan = Plan(candidates=candidates, search_seed=seed)
-    with (
-        stage_progress() as stage,
-        Pool(OnTarget("twin", camera), workers or os.cpu_count() or 1) as pool,
-    ):
+    asked = load_tasks(tasks, robot, overrides)
+    plan = Plan(cases=asked.cases(), candidates=candidates, search_seed=seed)
+    with sole_writer(out.with_name(f"{out.name}.lock"), f"--out {out}"), sigterm_stops():
+        identity = identity_of(asked, plan, camera, program())
+        with Journal(out.with_name(f"{out.name}.search"), identity) as journal:
+            for note in journal.notes:
+                click.echo(f"note: {note}", err=True)
+            if len(journal):
+                click.echo(f"{len(journal)} runs are there already", err=True)
+            try:
+                gains, verdict = _searched(asked, plan, repeats, camera, workers, journal)
+            except KeyboardInterrupt:
+                click.echo(f"kept in {journal.path}; the same command goes on", err=True)
+                raise
+            write_gain_set(out, gains)
+            journal.remove()
+    if as_json:
+        print_json({"gains": gains.model_dump(), "verdict": verdict.to_json()})
+    else:
+        _print(out, gains, verdict)
+
+
+def _searched(
+    tasks: Tasks, plan: Plan, repeats: int, camera: str, workers: int | None, journal: Journal
+) -> tuple[Gains, Verdict]:
+    """Search, judge, and return the gains with both in their origin."""
+    from hil.cli.progress import stage_progress
+    from hil.record.manifest import git_revision
+    from hil.study import tune
+    from hil.study.campaign.workers import Pool
+    from hil.study.tuning_verdict import held_out_trials, judge, with_verdict
+
+    worker = tune.OnTarget("twin", camera, dict(tasks.scenarios) if tasks.own else {})
+    with stage_progress() as stage, Pool(worker, workers or os.cpu_count() or 1) as pool:
         steps: dict[str, Stage] = {}
 
         def evaluate(trials: Sequence[Trial]) -> list[Figures]:
             law = trials[0].outer
             if law not in steps:
                 steps[law] = stage(law, plan.trials)
-            return pool.map(trials, steps[law].advance)
+            return journal.make(trials, pool.map, steps[law].advance)
 
-        gains = tune(
-            ControlConfig().active_gains,
+        gains = tune.tune(
+            tasks.base,
             evaluate,
             plan,
             target=f"twin, {camera} camera",
             revision=git_revision(),
             progress=lambda law, best: steps[law].best(best),
+            more=tasks.origin,
         )
-        trials = held_out_trials(gains, repeats)
+        trials = held_out_trials(gains, repeats, tasks.names)
         step = stage("held-out tape", len(trials))
-        verdict = judge(trials, pool.map(trials, step.advance))
-    gains = with_verdict(gains, verdict)
-    write_gain_set(out, gains)
-    if as_json:
-        print_json({"gains": gains.model_dump(), "verdict": verdict.to_json()})
-    else:
-        _print(out, gains, verdict)
+        verdict = judge(trials, journal.make(trials, pool.map, step.advance))
+    return with_verdict(gains, verdict), verdict
 
 
 def _print(out: Path, gains: Gains, verdict: Verdict) -> None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @click.group()
 def command() -> None:
-    """Serve the digital twin to other programs."""
+    """Serve the digital twin to other programs, or film it."""
 
 
 @command.command()
@@ -69,6 +69,42 @@ def serve(
         slipped = f", {server.slipped_s:.2f} s behind by now" if server.slipped_s else ""
         lag_ms = 1e3 * server.worst_lag_s
         click.echo(f"ended; kept real time within {lag_ms:.0f} ms{slipped}", err=True)
+
+
+@command.command()
+@click.option("--out", type=click.Path(path_type=Path), required=True, metavar="FILE",
+              help="The film to write, .avi or .mkv; the true poses go into a .csv beside it.")  # fmt: skip
+@click.option("--duration", "duration_s", type=click.FloatRange(0.1, 600.0), default=6.0,
+              show_default=True, metavar="SECONDS", help="How long.")  # fmt: skip
+@seed_option
+def film(out: Path, duration_s: float, seed: int) -> None:
+    """Film the robot driving a figure of eight, as the laboratory's camera sees it.
+
+    About 0.6 MB a second of film. `hil localise` reads it with the camera file of `hil twin samples`.
+    """
+    from hil.config.camera import CameraConfig
+    from sim_twin.samples import write_film
+
+    truth = write_film(out, CameraConfig(), duration_s, seed)
+    click.echo(f"{out}: {duration_s:g} s; the true poses are in {truth}")
+
+
+@command.command()
+@click.option("--out", type=click.Path(path_type=Path), required=True, metavar="FOLDER",
+              help="A new folder to fill.")  # fmt: skip
+@click.option("--duration", "duration_s", type=click.FloatRange(0.1, 600.0), default=6.0,
+              show_default=True, metavar="SECONDS", help="Of the film.")  # fmt: skip
+@seed_option
+def samples(out: Path, duration_s: float, seed: int) -> None:
+    """Draw all that the calibration page asks for: boards, tags on the floor, robot, a film.
+
+    With them every command of docs/calibration.md can be tried without a camera.
+    """
+    from hil.config.camera import CameraConfig
+    from sim_twin.samples import write_samples
+
+    lines = write_samples(out, CameraConfig(), duration_s, seed)
+    click.echo("\n".join([*lines, f"written to {out}"]))
 
 
 def _serving(

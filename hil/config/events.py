@@ -34,8 +34,8 @@ Target = Literal[
 TARGET_UNITS: Mapping[str, str] = {
     "eta1_dot_m_s2": "m/s^2", "eta2_dot_m_s2": "m/s^2", "theta_ddot_rad_s2": "rad/s^2",
     "force_forward_n": "N", "force_left_n": "N", "torque_yaw_n_m": "N m",
-    "load_left_n_m": "N m", "load_right_n_m": "N m",
-    "brake_left_n_m": "N m", "brake_right_n_m": "N m", "slope_x_rad": "rad", "slope_y_rad": "rad",
+    "load_left_n_m": "N m", "load_right_n_m": "N m", "brake_left_n_m": "N m",
+    "brake_right_n_m": "N m", "slope_x_rad": "rad", "slope_y_rad": "rad",
     "friction_change_ratio": "(ratio)", "battery_sag_v": "V",
 }  # fmt: skip
 # Constant amplitudes below these would drive what they are named to resist.
@@ -96,9 +96,13 @@ class Disturbance(Section):
     frequency_hz: float = quantity("Hz", "of the sine, or top of the noise", 0.5, gt=0, le=200)
     phase_rad: float = quantity("rad", "of the sine", 0.0, ge=-7, le=7)
     seed: int | None = quantity(
-        "", "of the noise, with the seed of the run; None: its own, from its place in the list. "
-        "Noises of one seed and frequency are one signal", None, ge=0, le=2**31 - 1,
-    )  # fmt: skip
+        "",
+        "of the noise, with the seed of the run; None: its own, from its place in the list. Noises "
+        "of one seed and frequency are one signal",
+        None,
+        ge=0,
+        le=2**31 - 1,
+    )
     zone: Zone | None = Field(None, description="acts only while the centre of mass is in there")
 
     @classmethod

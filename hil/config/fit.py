@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from hil.board._firmware import TICK_US
+from hil.board._firmware import ENCODER_COUNTS_1_S
 from hil.config.limits import board_defaults, board_table, check_board
 from hil.config.mismatch import true_robot
 from hil.core.errors import BadInput
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 # Share of the board's time-out that one period of set-points may take; the rest is for delays that
 # vary and for the board's own tick.
 _PERIOD_SHARE = 0.8
-# The encoder's edges of one tick are tallied in a signed byte (firmware_arduino/src/board/encoders.cpp).
-_COUNTS_A_TICK = 127
 
 
 def check_fit(scenario: Scenario) -> None:
@@ -39,11 +37,11 @@ def _check_counts(scenario: Scenario, board: Mapping[str, float]) -> None:
             f"board.ENC_COUNTS = {stated:g} counts/turn: the robot has "
             f"robot.encoder_counts_per_turn = {counts}, which the board is given; change that one"
         )
-    fastest_rad_s = _COUNTS_A_TICK / (TICK_US * 1e-6) * 2.0 * math.pi / counts
+    fastest_rad_s = ENCODER_COUNTS_1_S * math.tau / counts
     if board["OVER_W"] > fastest_rad_s:
         raise BadInput(
             f"robot.encoder_counts_per_turn = {counts} counts/turn: the board counts up to "
-            f"{_COUNTS_A_TICK} a tick, at most {_below(fastest_rad_s):g} rad/s; board.OVER_W = "
+            f"{ENCODER_COUNTS_1_S:.0f} counts/s, at most {_below(fastest_rad_s):g} rad/s; board.OVER_W = "
             f"{board['OVER_W']:g} rad/s is above; set it, and W_MAX with it, to that or less"
         )
 

@@ -8,11 +8,12 @@ the board's bound on wheel speed is scaled to it (`hil.control.laws.within`).
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING
 
-from hil.board._firmware import Parameter, parameter_table
+from hil.board._firmware import ENCODER_COUNTS_1_S, Parameter, parameter_table
 from hil.core.errors import BadInput
 
 if TYPE_CHECKING:
@@ -48,3 +49,17 @@ def check_board(values: Mapping[str, float]) -> None:
 def wheel_speed_max_rad_s(scenario: Scenario) -> float:
     """Return the largest wheel speed that the board accepts as a set-point."""
     return scenario.board.get("W_MAX", board_table()["W_MAX"].default)
+
+
+def check_edges(values: Mapping[str, float]) -> None:
+    """Raise BadInput when the encoders may give more counts than the board can count.
+
+    `values` are a board's parameters, whole; the board refuses to arm with such a set too.
+    """
+    counts_1_s = values["ENC_COUNTS"] * values["OVER_W"] / math.tau
+    if counts_1_s > ENCODER_COUNTS_1_S:
+        raise BadInput(
+            f"ENC_COUNTS = {values['ENC_COUNTS']:g} counts/turn at OVER_W = {values['OVER_W']:g} rad/s "
+            f"makes {counts_1_s:.0f} counts/s: the board counts up to {ENCODER_COUNTS_1_S:.0f} counts/s; "
+            "lower OVER_W (and W_MAX), or take an encoder with fewer counts a turn"
+        )

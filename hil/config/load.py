@@ -6,7 +6,6 @@ Every refusal is one BadInput line that names file, key, value with its unit, an
 from __future__ import annotations
 
 import difflib
-import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
@@ -15,7 +14,6 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from hil.board._firmware import ENCODER_COUNTS_1_S
 from hil.config.fields import told
 from hil.config.gains import shipped_gains
 from hil.config.limits import board_defaults, check_board
@@ -81,20 +79,6 @@ def _fill_board(tree: Tree) -> None:
     board = tree.get("board", {})
     if isinstance(board, dict):
         tree["board"] = board_defaults() | board
-
-
-def check_edges(values: Mapping[str, float]) -> None:
-    """Raise BadInput when the encoders may give more counts than the board can count.
-
-    `values` are a board's parameters, whole; the board refuses to arm with such a set too.
-    """
-    counts_1_s = values["ENC_COUNTS"] * values["OVER_W"] / math.tau
-    if counts_1_s > ENCODER_COUNTS_1_S:
-        raise BadInput(
-            f"ENC_COUNTS = {values['ENC_COUNTS']:g} counts/turn at OVER_W = {values['OVER_W']:g} rad/s "
-            f"makes {counts_1_s:.0f} counts/s: the board counts up to {ENCODER_COUNTS_1_S:.0f} counts/s; "
-            "lower OVER_W (and W_MAX), or take an encoder with fewer counts a turn"
-        )
 
 
 def read_tree(name_or_path: str, kind: str, above: tuple[str, ...] = ()) -> Tree:
@@ -166,8 +150,10 @@ def _read_text(name_or_path: str, kind: str) -> tuple[str, str, Path | None]:
     if not path.is_file():
         names = builtin_names(kind)
         near = difflib.get_close_matches(name_or_path, names, n=2)
-        hint = f"did you mean {' or '.join(near)}?" if near else f"built in: {', '.join(names)}"
-        raise BadInput(f"{one} {name_or_path!r}: no such file and no built-in {one}; {hint}")
+        known = f"; built in: {', '.join(names)}" if names else ""
+        hint = f"; did you mean {' or '.join(near)}?" if near else known
+        none = f" and no built-in {one}" if names else f"; give the path of a {one} file"
+        raise BadInput(f"{one} {name_or_path!r}: no such file{none}{hint}")
     try:
         return read_text(path), str(path), path.parent
     except (OSError, UnicodeDecodeError) as error:

@@ -99,7 +99,7 @@ class BringUpConfig(Section):
 
 
 class RobotConfig(Section):
-    """A four-wheel skid-steer robot, two driven wheels a side (control.md section 1)."""
+    """A four-wheel skid-steer robot, two driven wheels a side (docs/twin.md)."""
 
     name: PlainName = Field(min_length=1, max_length=60, description="of the robot, for people")
     variant: Literal["constrained", "slip", "lifted"] = Field(

@@ -68,17 +68,25 @@ class Circle:
         )
 
 
+# Places at which the bounds of a path are looked at, and how the highest of them are looked at again.
+_LOOKS = 2000
+_PEAKS = 40
+_CLOSER = 25
+
+
 @REFERENCES.register(
     "waypoints",
     settings=WaypointReference,
     summary="a smooth path through points, from rest to rest",
 )
 class Waypoints:
-    """A quintic spline through the waypoints, run from rest to rest.
+    """A quintic spline through the waypoints, run from rest to rest; two points: their line.
 
-    The path p(u) is four times differentiable in the chord length u; the time law u(t) is the
+    The path p(u) is four times differentiable in the chord length u, or, where that would leave the
+    straight lines between the points by more than the longest of them (points very unevenly
+    spread), in the sum of the chords' square roots (centripetal). The time law u(t) is the
     septic smooth step, whose speed, acceleration and jerk vanish at both ends. The duration is the
-    shortest that keeps speed and turn rate within their bounds.
+    shortest that keeps speed and turn rate within their bounds: 35/16 of length/speed on a line.
     """
 
     def __init__(self, config: WaypointReference) -> None:
@@ -89,27 +97,38 @@ class Waypoints:
                 f"reference.points_m: neighbouring waypoints {float(chords.min()):.4f} m apart, "
                 "at least 0.001 m is needed; drop the repeated point"
             )
-        knots = np.concatenate(([0.0], np.cumsum(chords)))
-        spline = _quintic(knots, points)
+        knots, spline = _path(points, chords)
         self._length = float(knots[-1])
         self._pieces = _pieces(spline, knots)
         self._knots = [float(k) for k in knots]
         self.duration_s = self._shortest_duration(spline, config)
 
     def _shortest_duration(self, spline: BSpline, config: WaypointReference) -> float:
-        """Return the duration at which the tighter of the two bounds is met."""
-        tau = np.linspace(0.0, 1.0, 2001)[1:-1]
+        """Return the duration at which the tighter of the two bounds is met.
+
+        Where it is met is looked for twice: over the whole way, then closer around the peaks, which
+        are narrow where the path all but turns back on itself.
+        """
+        tau = np.linspace(0.0, 1.0, _LOOKS + 1)
+        needed_s = self._needed_s(spline, config, tau)
+        peaks = np.argsort(needed_s[1:-1])[-_PEAKS:] + 1
+        closer = np.linspace(tau[peaks - 1], tau[peaks + 1], 2 * _CLOSER + 1)
+        return float(max(needed_s.max(), self._needed_s(spline, config, closer.ravel()).max()))
+
+    def _needed_s(self, spline: BSpline, config: WaypointReference, tau: np.ndarray) -> np.ndarray:
+        """Return the duration in s that the bounds ask for at each share of the duration."""
         u = self._length * tau**4 * (35 - 84 * tau + 70 * tau**2 - 20 * tau**3)
         rate = self._length * 140 * tau**3 * (1 - tau) ** 3
         d1, d2 = spline(u, 1), spline(u, 2)
         speed = np.hypot(d1[:, 0], d1[:, 1])
         turn = np.abs(d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]) / np.maximum(speed, 1e-9) ** 2
-        return float(
-            max(
-                (speed * rate).max() / config.speed_max_m_s,
-                (turn * rate).max() / config.turn_rate_max_rad_s,
-            )
-        )
+        by_speed, by_turn = rate / config.speed_max_m_s, rate / config.turn_rate_max_rad_s
+        return np.asarray(np.maximum(speed * by_speed, turn * by_turn), np.float64)
+
+    def share_of_way(self, t_s: float) -> float:
+        """Return how much of the way (chord length) is done at `t_s`, 0 to 1."""
+        tau = min(max(t_s / self.duration_s, 0.0), 1.0)
+        return tau**4 * (35 - 84 * tau + 70 * tau**2 - 20 * tau**3)
 
     def at(self, t_s: float) -> ReferenceState:
         """Return the desired state; before the start and after the end it is at rest."""
@@ -131,10 +150,36 @@ _Poly = tuple[float, ...]
 _Piece = tuple[float, _Poly, _Poly]
 
 
+def _path(points: np.ndarray, chords: np.ndarray) -> tuple[np.ndarray, BSpline]:
+    """Return the parameter at each waypoint and the path over it."""
+    knots, spline = points, None
+    for power in (1.0, 0.5):
+        knots = np.concatenate(([0.0], np.cumsum(chords**power)))
+        spline = _quintic(knots, points)
+        if _excursion_m(spline, knots, points) <= float(chords.max()):
+            break
+    return knots, spline
+
+
+def _excursion_m(spline: BSpline, knots: np.ndarray, points: np.ndarray) -> float:
+    """Return how far the path gets from the straight line between the waypoints on either side."""
+    share = np.linspace(0.0, 1.0, 33)[:, None]
+    path = spline(knots[:-1] + share * np.diff(knots))
+    along = np.diff(points, axis=0)
+    away = path - points[:-1]
+    t = np.clip((away * along).sum(-1) / (along**2).sum(-1), 0.0, 1.0)
+    return float(np.hypot(*np.moveaxis(away - t[..., None] * along, -1, 0)).max())
+
+
 def _quintic(knots: np.ndarray, points: np.ndarray) -> BSpline:
-    """Return the interpolating quintic spline with free ends (third and fourth derivative zero)."""
+    """Return the interpolating quintic spline with free ends (third and fourth derivative zero).
+
+    Free ends leave a parabola undecided by two points: there it is the straight line.
+    """
     from scipy.interpolate import make_interp_spline  # noqa: PLC0415 - slow import, rarely needed
 
+    if len(knots) == 2:
+        return make_interp_spline(knots, points, k=1)
     free = ([(3, np.zeros(2)), (4, np.zeros(2))], [(3, np.zeros(2)), (4, np.zeros(2))])
     return make_interp_spline(knots, points, k=5, bc_type=free)
 
@@ -174,3 +219,19 @@ def make_reference(config: ReferenceConfig) -> Reference:
     """Return the reference a scenario asks for; raises BadInput where there is none such."""
     made: Reference = REFERENCES.get(config.kind).factory(config)
     return made
+
+
+def unfinished(config: ReferenceConfig, duration_s: float) -> str | None:
+    """Return a sentence when a run of `duration_s` ends before its reference does, else None."""
+    if not isinstance(config, WaypointReference):
+        return None
+    reference = Waypoints(config)
+    if reference.duration_s <= duration_s:
+        return None
+    way = reference.share_of_way(duration_s)
+    return (
+        f"reference.points_m: the way takes {reference.duration_s:.4g} s within speed_max_m_s = "
+        f"{config.speed_max_m_s:g} m/s and turn_rate_max_rad_s = {config.turn_rate_max_rad_s:g} rad/s, "
+        f"the run ends after {duration_s:g} s with {100 * way:.2g} % of it done, and its figures "
+        "judge no more than that; give duration_s more, or the path a wider turn"
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from hil.control.references import Waypoints, make_reference
+from hil.control.references import make_reference, unfinished
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
@@ -22,11 +22,8 @@ def notes(scenario: Scenario) -> list[str]:
     reference = make_reference(scenario.reference)
     limits, run_s = scenario.control.limits, scenario.duration_s
     found = []
-    if isinstance(reference, Waypoints) and reference.duration_s > run_s:
-        found.append(
-            f"the reference takes {reference.duration_s:.3g} s and the run ends after {run_s:g} s "
-            "(duration_s): errors are those of its beginning"
-        )
+    if told := unfinished(scenario.reference, run_s):
+        found.append(told)
     rates = [reference.at(run_s * k / _SAMPLES).z1_dot_m_s for k in range(_SAMPLES + 1)]
     fastest = max(math.hypot(*rate) for rate in rates)
     most = math.hypot(limits.eta1_max_m_s, scenario.robot.d0_m * limits.theta_dot_max_rad_s)

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 # Lossless, or a replay of the frames would not be exact. HuffYUV codes a 640 x 480 frame in about
 # 3 ms where FFV1, a third smaller, takes 20 ms: too long beside a control loop on one core.
 _CODEC = "HFYU"
+# With losses: JPEG pictures of this quality, a sixth of the size (docs/run-record.md). A replay does
+# not look at them.
+_SMALL_CODEC = "MJPG"
+_SMALL_QUALITY = 95
 _JPEG_QUALITY = 80
 _QUEUE_FRAMES = 256
 
@@ -32,7 +36,8 @@ class CameraKeeper:
     """Takes every frame; writes a JPEG per `picture_period_s`, and of the last frame, to `folder`.
 
     With `video` set, every frame also goes to that file, in order: frame k of the video belongs to
-    row k of frames.parquet. Images handed over must not be changed afterwards.
+    row k of frames.parquet. It is lossless, or motion JPEG when its name ends in .avi. Images handed
+    over must not be changed afterwards.
     """
 
     def __init__(
@@ -94,9 +99,15 @@ class CameraKeeper:
     def _write_video(self, path: Path, image: Image) -> None:
         if self._writer is None:
             height, width = image.shape[:2]
-            code = cv2.VideoWriter.fourcc(*_CODEC)
-            self._writer = cv2.VideoWriter(str(path), code, self._rate_hz, (width, height))
+            small = path.suffix == ".avi"
+            codec = _SMALL_CODEC if small else _CODEC
+            code = cv2.VideoWriter.fourcc(*codec)
+            system = cv2.CAP_OPENCV_MJPEG if small else cv2.CAP_ANY
+            size = (width, height)
+            self._writer = cv2.VideoWriter(str(path), system, code, self._rate_hz, size)
             if not self._writer.isOpened():
-                self.error = f"{path}: the video cannot be written ({_CODEC}); run without it"
+                self.error = f"{path}: the video cannot be written ({codec}); run without it"
                 return
+            if small:
+                self._writer.set(cv2.VIDEOWRITER_PROP_QUALITY, _SMALL_QUALITY)
         self._writer.write(image)

@@ -11,113 +11,56 @@ A mapping (TOML) says what the run was and where each column of `samples.parquet
 
 Of a telemetry log, poses and commands of standard messages need no mapping. Columns nobody gives
 stay empty, but for those that follow: speeds from the pose, delta1 from pose and reference, wheel
-commands from body commands.
+commands from body commands. What was left out, repaired or assumed is said in notes, which are
+also events of the record.
 """
 
 from __future__ import annotations
 
-import bisect
-import csv
 import math
 import time
-import tomllib
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import Field, ValidationError
 
-from hil.config.base import Section
 from hil.config.load import load_scenario
 from hil.control.estimators.geometry import BelievedGeometry
 from hil.control.references import make_reference
-from hil.core.errors import BadInput
-from hil.core.files import LOG_BYTES, check_size, read_bounded, read_text
+from hil.record.log_csv import read_csv
+from hil.record.log_mapping import LogMapping, read_mapping
+from hil.record.log_signals import Signals
+from hil.record.log_telemetry import read_tlog
 from hil.record.manifest import Manifest, collect_versions, git_revision
 from hil.record.recorder import Recorder
 from hil.record.schema import SAMPLE_NAMES
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from hil.config.scenario import Scenario
+    from hil.record.log_signals import Array
     from hil.record.reader import RunRecord
 
-    Array = NDArray[np.float64]
-
-_POSE = ("est_x_m", "est_y_m", "est_theta_rad")
-
-
-class Source(Section):
-    """Where a signal comes from; what is read is value * scale + offset in the column's unit."""
-
-    column: str = ""
-    message: str = ""
-    field: str = ""
-    scale: float = 1.0
-    offset: float = 0.0
-
-
-class LogMapping(Section):
-    """What a foreign log is a log of."""
-
-    scenario: str = Field("scenario-1", description="the task: built-in name or TOML file")
-    set: tuple[str, ...] = ()
-    outer: str = Field("unknown", min_length=1, description="law on the host, as it was called")
-    inner: str = Field("unknown", min_length=1, description="law on the board")
-    seed: int = 0
-    t: Source = Source(column="t_s")
-    columns: dict[str, Source] = Field(default_factory=dict)
-
-
-# From north-east-down of ground stations to world X east, Y north, theta from X (hil/tools/bridge.py).
-STANDARD = {
-    "est_x_m": Source(message="LOCAL_POSITION_NED", field="y"),
-    "est_y_m": Source(message="LOCAL_POSITION_NED", field="x"),
-    "est_theta_rad": Source(message="ATTITUDE", field="yaw", scale=-1.0, offset=math.pi / 2),
-    "eta1_cmd_m_s": Source(message="SET_POSITION_TARGET_LOCAL_NED", field="vx"),
-    "theta_dot_cmd_rad_s": Source(
-        message="SET_POSITION_TARGET_LOCAL_NED", field="yaw_rate", scale=-1.0
-    ),
-    "omega_cmd_left_rad_s": Source(message="WHEEL_SETPOINT", field="omega_left_rad_s"),
-    "omega_cmd_right_rad_s": Source(message="WHEEL_SETPOINT", field="omega_right_rad_s"),
-    "omega_meas_left_rad_s": Source(message="WHEEL_STATE", field="omega_left_rad_s"),
-    "omega_meas_right_rad_s": Source(message="WHEEL_STATE", field="omega_right_rad_s"),
-    "pwm_left_counts": Source(message="WHEEL_STATE", field="pwm_left_counts"),
-    "pwm_right_counts": Source(message="WHEEL_STATE", field="pwm_right_counts"),
-    "battery_v": Source(message="SYS_STATUS", field="voltage_battery", scale=1e-3),
-}
-
-
-class Message(NamedTuple):
-    """One decoded frame of a telemetry log; `frame` is None for MAVLink 1."""
-
-    t_s: float
-    name: str
-    values: Any
-    frame: bytes | None
+# Faster than this no small wheeled robot drives: the rows are of two, or in another unit.
+_SPEED_BELIEVED_M_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
-class Signals:
-    """Columns read from a log, all on the times `t_s`, and the frames to keep."""
+class Imported:
+    """A record made of a log, and a line for each thing that was left out, repaired or assumed."""
 
-    t_s: Array
-    columns: dict[str, Array]
-    frames: tuple[tuple[float, bytes], ...] = ()
+    record: RunRecord
+    notes: tuple[str, ...]
 
 
-def import_log(log: Path, mapping: Path | None, out: Path, command: str) -> RunRecord:
+def import_log(log: Path, mapping: Path | None, out: Path, command: str) -> Imported:
     """Make a run record of a foreign log in the new folder `out`; raises BadInput."""
-    settings = _read_mapping(mapping)
+    settings = read_mapping(mapping)
     scenario = load_scenario(_beside(mapping, settings.scenario), settings.set)
-    signals = _read_tlog(log, settings) if log.suffix == ".tlog" else _read_csv(log, settings)
-    if signals.t_s.size < 2:
-        raise BadInput(f"{log}: {signals.t_s.size} rows with a time, at least 2 are needed")
+    signals = read_tlog(log, settings) if log.suffix.lower() == ".tlog" else read_csv(log, settings)
     columns = _completed(signals, scenario)
+    notes = (*signals.notes, *_doubts(columns), *_assumed(settings, scenario, columns["t_s"]))
     recorder = Recorder(out, _manifest(log, scenario, settings, command))
     for t_s, frame in signals.frames:
         recorder.link_frame(t_s, frame)
@@ -125,27 +68,41 @@ def import_log(log: Path, mapping: Path | None, out: Path, command: str) -> RunR
     for row in table.tolist():
         recorder.append(row)
     recorder.event(0.0, "imported", f"{log.name}, {signals.t_s.size} rows")
-    return recorder.close("complete", f"imported from {log.name}")
+    for note in notes:
+        recorder.event(0.0, "note", note)
+    return Imported(recorder.close("complete", f"imported from {log.name}"), notes)
 
 
-def _read_mapping(path: Path | None) -> LogMapping:
-    if path is None:
-        return LogMapping()
-    try:
-        settings = LogMapping.model_validate(tomllib.loads(read_text(path)))
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(f"mapping {path}: cannot be read: {error}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise BadInput(f"{path}: not valid TOML: {error}") from None
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = ".".join(str(part) for part in first["loc"])
-        said = first["msg"].removeprefix("Value error, ")
-        raise BadInput(f"{path}: {key}: {said}") from None
-    for name in settings.columns:
-        if name not in SAMPLE_NAMES or name == "t_s":
-            raise BadInput(f"{path}: columns.{name}: no such column of samples.parquet")
-    return settings
+def _assumed(settings: LogMapping, scenario: Scenario, t_s: Array) -> list[str]:
+    """Return what was taken for granted about the task."""
+    said = []
+    if "scenario" not in settings.model_fields_set:
+        said.append(
+            f"no mapping says what the task was: {scenario.name} assumed, with its reference and "
+            "requirements"
+        )
+    lasts_s = float(t_s[-1])
+    if lasts_s < 0.95 * scenario.duration_s:
+        said.append(
+            f"the log lasts {lasts_s:.3g} s, {scenario.name} takes {scenario.duration_s:g} s: figures "
+            "are of the part that is there"
+        )
+    return said
+
+
+def _doubts(columns: dict[str, Array]) -> list[str]:
+    """Return a line when the pose jumps further than a robot drives."""
+    t_s = columns["t_s"]
+    steps_m = np.hypot(np.diff(columns["est_x_m"]), np.diff(columns["est_y_m"]))
+    speeds_m_s = steps_m / np.diff(t_s)
+    fast = np.flatnonzero(speeds_m_s > _SPEED_BELIEVED_M_S)
+    if not fast.size:
+        return []
+    worst = int(np.argmax(speeds_m_s))
+    return [
+        f"the pose jumps {fast.size} times, at {t_s[worst]:.3f} s by {steps_m[worst]:.3g} m "
+        f"({speeds_m_s[worst]:.3g} m/s): two robots in one log, or another unit?"
+    ]
 
 
 def _beside(mapping: Path | None, name: str) -> str:
@@ -154,115 +111,9 @@ def _beside(mapping: Path | None, name: str) -> str:
     return name
 
 
-def _read_csv(path: Path, settings: LogMapping) -> Signals:
-    try:
-        check_size(path)
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise BadInput(f"{path}: cannot be read as CSV: {error}") from None
-    names = list(rows[0]) if rows else []
-
-    def column(source: Source, what: str) -> Array:
-        if source.column not in names:
-            raise BadInput(
-                f"{path}: has no column {source.column!r} for {what}; it has {', '.join(names)}"
-            )
-        raw = np.array([_number(row[source.column]) for row in rows])
-        return raw * source.scale + source.offset
-
-    t_s = column(settings.t, "t")
-    known = np.isfinite(t_s)
-    order = np.flatnonzero(known)[np.argsort(t_s[known], kind="stable")]
-    wanted = {name: source for name, source in settings.columns.items() if source.column}
-    found = {name: column(source, name)[order] for name, source in wanted.items()}
-    return Signals(t_s[order] - (t_s[order[0]] if order.size else 0.0), found)
-
-
-def _number(text: str | None) -> float:
-    try:
-        return float(text) if text else math.nan
-    except ValueError:
-        return math.nan
-
-
-def _read_tlog(path: Path, settings: LogMapping) -> Signals:
-    """Return one row per message that gives est_x_m; other signals hold their latest value."""
-    sources = STANDARD | {n: s for n, s in settings.columns.items() if s.message}
-    messages = list(_messages(path))
-    series: dict[str, tuple[list[float], list[float]]] = {name: ([], []) for name in sources}
-    for message in messages:
-        for name, source in sources.items():
-            if message.name == source.message and hasattr(message.values, source.field):
-                value = float(getattr(message.values, source.field))
-                series[name][0].append(message.t_s)
-                series[name][1].append(value * source.scale + source.offset)
-    rows = series["est_x_m"][0]
-    if not rows:
-        raise BadInput(
-            f"{path}: has no {sources['est_x_m'].message} among its {len(messages)} messages; "
-            "name the message of the pose in a mapping"
-        )
-    start_s = rows[0]
-    columns = {name: _held(*pair, rows) for name, pair in series.items() if pair[0]}
-    frames = tuple((m.t_s - start_s, m.frame) for m in messages if m.frame is not None)
-    return Signals(np.array(rows) - start_s, columns, frames)
-
-
-def _held(times: list[float], values: list[float], at: list[float]) -> Array:
-    """Return the latest value at or before each time; NaN before the first."""
-    places = [bisect.bisect_right(times, t_s) - 1 for t_s in at]
-    return np.array([values[place] if place >= 0 else math.nan for place in places])
-
-
-def _messages(path: Path) -> Iterator[Message]:
-    """Yield every message of a telemetry log that a known dialect can decode."""
-    from pymavlink.dialects.v20 import ardupilotmega  # noqa: PLC0415 - large, for this errand only
-
-    from hil.wire import dialect  # noqa: PLC0415 - as above
-
-    decoders: list[tuple[Any, Mapping[int, Any]]] = [
-        (dialect.MAVLink(None), dialect.mavlink_map),
-        (ardupilotmega.MAVLink(None), ardupilotmega.mavlink_map),
-    ]
-    try:
-        data = read_bounded(path, LOG_BYTES)
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
-    at = 0
-    while (end := _frame_end(data, at + 8)) is not None:
-        frame = data[at + 8 : end]
-        msg_id = int.from_bytes(frame[7:10], "little") if frame[0] == 0xFD else frame[5]
-        for decoder, known in decoders:
-            if msg_id in known:
-                try:
-                    message = decoder.decode(bytearray(frame))
-                except Exception:
-                    continue
-                whole = frame if frame[0] == 0xFD else None
-                t_s = int.from_bytes(data[at : at + 8], "big") * 1e-6
-                yield Message(t_s, message.get_type(), message, whole)
-                break
-        at = end
-
-
-def _frame_end(data: bytes, start: int) -> int | None:
-    """Return where the frame ends that begins at `start`; None at the end or where none begins."""
-    if start + 10 > len(data) or data[start] not in {0xFD, 0xFE}:
-        return None
-    if data[start] == 0xFE:
-        end = start + 8 + data[start + 1]
-    else:
-        end = start + 12 + data[start + 1] + 13 * (data[start + 2] & 1)
-    return end if end <= len(data) else None
-
-
 def _completed(signals: Signals, scenario: Scenario) -> dict[str, Array]:
     """Return every column of the record: those given, those that follow from them, NaN."""
     t_s, given = signals.t_s, dict(signals.columns)
-    missing = [name for name in _POSE if name not in given]
-    if missing:
-        raise BadInput(f"the log gives no {missing[0]}: a record needs the pose {', '.join(_POSE)}")
     robot = scenario.robot
     x, y = given["est_x_m"], given["est_y_m"]
     theta = _unwrapped(given["est_theta_rad"])

@@ -14,7 +14,15 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    PrivateAttr,
+    ValidationError,
+    field_validator,
+)
 
 from hil.core.errors import BadInput
 from hil.core.files import RECORD_BYTES, read_bounded
@@ -101,13 +109,36 @@ class Manifest(BaseModel):
         0, description="wall time of t_s = 0, in link.tlog too; until control begins, of opening"
     )
     tick_count: int = 0
-    link: dict[str, float] = Field(default_factory=dict, description="counters of the host link")
+    link: dict[str, FiniteFloat] = Field(
+        default_factory=dict, description="counters of the host link"
+    )
     files: dict[str, FileEntry] = Field(default_factory=dict)
+
+    @field_validator("scenario")
+    @classmethod
+    def _can_be_judged(cls, tree: dict[str, Any]) -> dict[str, Any]:
+        """Refuse what no scenario has, as a file edited by hand may: the rest is read as it is."""
+        if not isinstance(tree.get("duration_s", 0.0), int | float):
+            raise ValueError(f"duration_s = {tree['duration_s']!r} is no number of seconds")
+        listed = tree.get("requirements", [])
+        if not isinstance(listed, list | tuple) or not all(
+            _is_requirement(item) for item in listed
+        ):
+            raise ValueError(
+                "requirements is no list of tables with metric, and min or max in numbers"
+            )
+        return tree
 
     @property
     def scenario_name(self) -> str:
         """Return the scenario's own name."""
         return str(self.scenario.get("name", ""))
+
+
+def _is_requirement(item: object) -> bool:
+    if not isinstance(item, Mapping) or not isinstance(item.get("metric"), str):
+        return False
+    return all(isinstance(item.get(key), int | float | None) for key in ("min", "max"))
 
 
 def write_manifest(folder: Path, manifest: Manifest, *, durable: bool = False) -> None:

@@ -116,7 +116,11 @@ def read_run(path: Path) -> RunRecord:
     missing = [name for name in SAMPLE_NAMES if name not in samples]
     if missing:
         raise BadInput(f"{path / layout.SAMPLES}: damaged: column {missing[0]} is missing")
-    frames = read_table(path, layout.FRAMES, layout.FRAMES_JOURNAL, required=False)
+    frames: Columns = {}
+    try:
+        frames = read_table(path, layout.FRAMES, layout.FRAMES_JOURNAL, required=False)
+    except BadInput as error:  # the samples are whole: what was seen is lost, the run is not
+        problems.append(str(error))
     return RunRecord(
         path=path,
         manifest=manifest,
@@ -171,14 +175,14 @@ def read_events(path: Path) -> tuple[Event, ...]:
 
 
 def picture_name(t_s: float) -> str:
-    """Return the file name of the picture that arrived at `t_s`."""
-    return f"{t_s:08.3f}s.jpg"
+    """Return the file name of the picture that arrived at `t_s`; no name begins with a dash."""
+    return f"t{t_s:08.3f}s.jpg"
 
 
 def read_pictures(folder: Path) -> tuple[Picture, ...]:
-    """Return the pictures of a record in time order."""
+    """Return the pictures of a record in time order; older records name them without the t."""
     pictures = []
     for file in folder.glob("*s.jpg"):
         with contextlib.suppress(ValueError):  # somebody else's file
-            pictures.append(Picture(float(file.stem.removesuffix("s")), file))
+            pictures.append(Picture(float(file.stem.removeprefix("t").removesuffix("s")), file))
     return tuple(sorted(pictures, key=lambda picture: picture.t_s))

@@ -46,6 +46,7 @@ class Recorder:
         manifest: Manifest,
         *,
         record_camera: bool = False,
+        small_video: bool = False,
         frame_rate_hz: float = 30.0,
         rerun: bool = True,
         plugins: Sequence[Plugin] = (),
@@ -61,7 +62,8 @@ class Recorder:
         except OSError as error:
             raise self._keeping.fail(error) from None
         self._camera: CameraKeeper | None = None
-        self._video = out_dir / layout.CAMERA if record_camera else None
+        kept = layout.CAMERA_SMALL if small_video else layout.CAMERA
+        self._video = out_dir / kept if record_camera or small_video else None
         self._frame_rate_hz = frame_rate_hz
         self._next_flush_s = -math.inf
         self._rows = 0

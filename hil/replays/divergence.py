@@ -24,7 +24,8 @@ class Channel:
     """One channel compared bit for bit over `rows` rows; `different` of them differ.
 
     `first_s`, `recorded` and `replayed` tell of the first difference; `largest` is the largest
-    |recorded - replayed|, NaN where a value exists on one side only.
+    |recorded - replayed|, NaN where a value exists on one side only. `rms` is the root mean square of
+    the difference over all rows that have both values, NaN when there is none.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Channel:
     recorded: float | str = math.nan
     replayed: float | str = math.nan
     largest: float = 0.0
+    rms: float = 0.0
 
     @property
     def same(self) -> bool:
@@ -60,6 +62,7 @@ class Channel:
                 "recorded": _plain(self.recorded),
                 "replayed": _plain(self.replayed),
                 "largest": _plain(self.largest),
+                "rms": _plain(self.rms),
             }
         return tree
 
@@ -94,7 +97,13 @@ def _compare(
         float(one[at]),
         float(two[at]),
         float(np.abs(one[where] - two[where]).max()),
+        _rms(one - two),
     )
+
+
+def _rms(difference: NDArray[np.float64]) -> float:
+    known = difference[np.isfinite(difference)]
+    return float(np.sqrt(np.mean(np.square(known)))) if known.size else math.nan
 
 
 def compare_link(
@@ -128,6 +137,7 @@ def _compare_frames(
         (first.unix_us - start_unix_us) * 1e-6,
         _frame_text(first.frame),
         _frame_text(other.frame),
+        math.nan,
         math.nan,
     )
 

@@ -135,10 +135,7 @@ def replay(
         _refuse_without_ticks(source)
     if shadow is not None:
         samples = samples | shadow.columns(parts.geometry.wheels, samples["t_s"].size)
-    stamps = [
-        LoggedFrame(source.manifest.start_unix_us + round(t_s * 1e6), frame)
-        for t_s, frame in recorder.link_frames
-    ]
+    stamps = _stamps(source, samples, recorder.link_frames)
     return ReplayReport(
         path=path,
         kind=kind,
@@ -163,6 +160,28 @@ def _refuse_without_ticks(source: Source) -> None:
             f"{source.path}: has no tick: the run ended before its first one ({why}); nothing to "
             "replay"
         )
+
+
+def _stamps(
+    source: Source, samples: Columns, frames: Sequence[tuple[float, bytes]]
+) -> list[LoggedFrame]:
+    """Return the replay's frames on the link, dated as those of the record.
+
+    A replay that ends before the first tick (the camera's frames are lost) still counts from its
+    opening, the record from its first tick, in whole microseconds: there the first frame on the link
+    is the common instant, and one microsecond is rounding.
+    """
+    zero_us = source.manifest.start_unix_us
+    before_first_tick = not samples["t_s"].size and frames and source.link
+    if before_first_tick:
+        zero_us = source.link[0].unix_us - round(frames[0][0] * 1e6)
+    found = [LoggedFrame(zero_us + round(t_s * 1e6), frame) for t_s, frame in frames]
+    if not before_first_tick:
+        return found
+    return [
+        there._replace(frame=here.frame) if abs(here.unix_us - there.unix_us) <= 1 else here
+        for here, there in zip(found, source.link, strict=False)
+    ]
 
 
 def _changed(recorded: Scenario, overrides: Sequence[str]) -> Scenario:

@@ -88,7 +88,8 @@ class Side:
 class FirmwareReport:
     """How well the firmware's PWM agrees with the recorded one; `shadow` when the law was changed.
 
-    `firmware` is "core" or "elf".
+    `firmware` is "core" or "elf". A shadow is taken at the encoder phase at which the recorded law
+    fits best; `recorded_law_apart` is what that law is off there (left, right), in counts RMS.
     """
 
     firmware: str
@@ -101,6 +102,7 @@ class FirmwareReport:
     phase_rms: dict[int, float]
     left: Side
     right: Side
+    recorded_law_apart: tuple[float, float] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the report for a JSON document."""
@@ -123,6 +125,12 @@ class FirmwareReport:
                 for name, side in (("left", self.left), ("right", self.right))
             ),
         ]
+        if self.recorded_law_apart is not None:
+            left, right = self.recorded_law_apart
+            lines.append(
+                f"  the recorded law itself is {left:.1f} (left) and {right:.1f} counts RMS (right) apart "
+                "at this phase: less than that is no effect of the change"
+            )
         if self.build_recorded != self.build_here:
             lines.append(
                 f"  note: recorded with firmware {self.build_recorded or 'unknown'}, "
@@ -159,8 +167,16 @@ def replay_wheels(
     check_board(scenario.board)
     law = inner or source.manifest.inner
     shadow = bool(overrides) or law != source.manifest.inner
-    parameters = board_parameters(scenario, law)
-    return replay_firmware(source, parameters, law, firmware or core(), shadow=shadow)
+    through = firmware or core()
+    recorded = build(Scenario, source.manifest.scenario, str(path / layout.MANIFEST))
+    own = replay_firmware(
+        source, board_parameters(recorded, source.manifest.inner), source.manifest.inner, through
+    )
+    return (
+        replay_firmware(source, board_parameters(scenario, law), law, through, own)
+        if shadow
+        else own
+    )
 
 
 def core() -> Firmware:
@@ -173,10 +189,12 @@ def replay_firmware(
     parameters: Mapping[str, float],
     inner: str,
     firmware: Firmware,
-    *,
-    shadow: bool,
+    recorded: FirmwareReport | None = None,
 ) -> FirmwareReport:
-    """Run it on a record's set-points and counts; raises BadInput without enough of them."""
+    """Run it on a record's set-points and counts; raises BadInput without enough of them.
+
+    With the report of the `recorded` law this is a shadow, of another law or other parameters.
+    """
     trace, arrivals = read_reports(source)
     if int(trace.armed.sum()) < _LEAST_REPORTS:
         raise BadInput(
@@ -186,13 +204,19 @@ def replay_firmware(
     sent = sent_frames(source, arrivals)
     found = {phase: _run(firmware, trace, sent, parameters, phase) for phase in PHASES_US}
     rms = {phase: _rms(pwm[trace.armed] - trace.pwm[trace.armed]) for phase, pwm in found.items()}
-    # Without a clear best phase (a shadow, or a wheel at rest) the tick itself is the honest one.
-    best = min(rms, key=lambda phase: (round(rms[phase], 3), abs(phase))) if not shadow else 0
+    # Without a clear best phase (a wheel at rest) the tick itself is the honest one. Where the encoder
+    # was read is a fact of the record, which a shadow's own fit cannot tell.
+    best = min(rms, key=lambda phase: (round(rms[phase], 3), abs(phase)))
+    if recorded is not None:
+        best = recorded.phase_us
     pwm = found[best][trace.armed]
+    left, right = (_side(trace.pwm[trace.armed][:, i], pwm[:, i]) for i in (0, 1))
     return FirmwareReport(
-        firmware.name, source.manifest.firmware_build_id, firmware.build_id, inner, shadow,
+        firmware.name, source.manifest.firmware_build_id, firmware.build_id, inner,
+        recorded is not None,
         int(trace.armed.sum()), best, {k: round(v, 3) for k, v in rms.items()},
-        *(_side(trace.pwm[trace.armed][:, i], pwm[:, i]) for i in (0, 1)),
+        left, right,
+        (recorded.left.rms_difference, recorded.right.rms_difference) if recorded else None,
     )  # fmt: skip
 
 

@@ -10,17 +10,19 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from random import Random
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.stats import t as student
 
 from hil.board._firmware import PWM_TOP
 from hil.config.mismatch import true_robot
 from hil.core.errors import BadInput
+from hil.core.types import wrap_pi
 from hil.replays.firmware import Sent, Trace, decoded, read_reports, sent_frames
 from hil.runs.execute import board_parameters
 from hil.wire import dialect
@@ -44,10 +46,15 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "floor friction": ("floor.friction_ratio",),
 }
 _BOUNDS = (0.6, 1.6)
+# A ratio that is known no better than this, or only as beyond the bounds, is not told by the record.
+_KNOWN = 0.1
+_MOST_EVALUATIONS = 15
 # Quantised counts make the residual rough on a small scale: differences are taken over 2 %.
 _STEP = 0.02
+_SPAN, _SPAN_TIE_S = 0.06, 0.01  # and over twice these for the intervals
 # Size of a usual disagreement of each kind, which makes the residual a pure number.
 _SCALES = {"wheel speed": 0.3, "pwm": 15.0, "forward": 0.004, "turn": 0.02}
+_COLUMNS = {"wheel speed": 2, "pwm": 2, "forward": 1, "turn": 1}
 UNITS = {"wheel speed": "rad/s", "pwm": "counts", "forward": "m", "turn": "rad"}
 _WINDOW_S = 0.5
 _BLOCK_S = 1.0
@@ -64,12 +71,6 @@ class Windows(NamedTuple):
 
     values: dict[str, Array]
 
-    def stacked(self, chosen: NDArray[np.bool_]) -> Array:
-        """Return the chosen windows as one vector in units of _SCALES."""
-        return np.concatenate(
-            [(self.values[name][chosen] / scale).ravel() for name, scale in _SCALES.items()]
-        )
-
 
 @dataclass(frozen=True, slots=True)
 class Fit:
@@ -82,19 +83,49 @@ class Fit:
     residual_fitted: dict[str, float]
     residual_held_out: dict[str, float]
     residual_unfitted: dict[str, float]
+    converged: bool = True
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Return what limits the ratios: the edge of the box that was searched, its budget."""
+        margin = 0.01 * (_BOUNDS[1] - _BOUNDS[0])
+        found = [
+            f"{group} = {value:.3f} lies at the edge of what is searched "
+            f"({_BOUNDS[0]:g} to {_BOUNDS[1]:g}): the true ratio may be beyond"
+            for group, (value, _, _) in self.ratios.items()
+            if not _BOUNDS[0] + margin < value < _BOUNDS[1] - margin
+        ]
+        if not self.converged:
+            found.append(
+                f"the search ended by its budget of {_MOST_EVALUATIONS} evaluations, not by itself"
+            )
+        return tuple(found)
 
     @property
     def mismatch(self) -> dict[str, float]:
         """Return the ratios by dotted robot key, as a scenario takes them."""
         return {key: self.ratios[group][0] for group, keys in GROUPS.items() for key in keys}
 
+    def identifiable(self, group: str) -> bool:
+        """Say whether the record tells a group's ratio: to 10 %, and within what was searched."""
+        _, low, high = self.ratios[group]
+        return 0.5 * (high - low) <= _KNOWN and _BOUNDS[0] < low and high < _BOUNDS[1]
+
     def to_json(self) -> dict[str, Any]:
         """Return the fit for a JSON document."""
         return {
             "ratios": {
-                group: {"value": value, "interval_95": [low, high], "keys": list(GROUPS[group])}
+                group: {
+                    "value": value,
+                    "interval_95": [low, high],
+                    "identifiable": self.identifiable(group),
+                    "keys": list(GROUPS[group]),
+                }
                 for group, (value, low, high) in self.ratios.items()
             },
+            "searched": list(_BOUNDS),
+            "converged": self.converged,
+            "notes": list(self.notes),
             "camera_tie_s": self.camera_tie_s,
             "windows_fitted": self.windows_fitted,
             "windows_held_out": self.windows_held_out,
@@ -193,8 +224,9 @@ class Rehearsal:
         """Return where the camera saw the robot before it was armed."""
         t_us, poses = self._poses_board(0.0)
         before = poses[t_us < self.edges_us[0]]
-        x, y, theta = np.median(before if before.size else poses[:1], axis=0)
-        return float(x), float(y), float(theta)
+        before = before if before.size else poses[:1]
+        x_m, y_m = np.median(before[:, :2], axis=0)
+        return float(x_m), float(y_m), median_angle_rad(before[:, 2])
 
     def _cut(
         self,
@@ -249,9 +281,12 @@ def fit_twin(rehearsal: Rehearsal) -> Fit:
     high = [_BOUNDS[1]] * len(names) + [_CLOCK_TIE_BOUND_S]
     found = least_squares(
         residual, start, bounds=(low, high), diff_step=[_STEP] * len(names) + [0.1],
-        x_scale=[0.1] * len(names) + [0.01], loss="soft_l1", max_nfev=15,
+        x_scale=[0.1] * len(names) + [0.01], loss="soft_l1", max_nfev=_MOST_EVALUATIONS,
     )  # fmt: skip
-    reach = _reach(found.jac, found.fun)
+    seen, unseen = _rms(difference(found.x, fitted)), _rms(difference(found.x, held_out))
+    reach = _reach(
+        _sensitivity(residual, found.x), found.fun, {n: max(seen[n], unseen[n]) for n in _SCALES}
+    )
     return Fit(
         ratios={
             name: (float(found.x[i]), float(found.x[i] - reach[i]), float(found.x[i] + reach[i]))
@@ -260,17 +295,48 @@ def fit_twin(rehearsal: Rehearsal) -> Fit:
         camera_tie_s=float(found.x[-1]),
         windows_fitted=int(fitted.sum()),
         windows_held_out=int(held_out.sum()),
-        residual_fitted=_rms(difference(found.x, fitted)),
-        residual_held_out=_rms(difference(found.x, held_out)),
+        residual_fitted=seen,
+        residual_held_out=unseen,
         residual_unfitted=_rms(difference(np.append(start[:-1], found.x[-1]), held_out)),
+        converged=found.status > 0,
     )
 
 
-def _reach(jacobian: Array, residual: Array) -> Array:
-    """Return half the 95 % interval of each parameter, from the fit's linearisation."""
+def median_angle_rad(angles_rad: Array) -> float:
+    """Return the median of angles that lie within half a turn of each other, in (-pi, pi]."""
+    middle = math.atan2(np.sin(angles_rad).sum(), np.cos(angles_rad).sum())
+    away = np.remainder(angles_rad - middle + math.pi, 2.0 * math.pi) - math.pi
+    return wrap_pi(middle + float(np.median(away)))
+
+
+def _sensitivity(residual: Callable[[Array], Array], at: Array) -> Array:
+    """Return the residual's derivatives, central over _SPAN; the search's own are rough."""
+    spans = np.array([_SPAN] * (at.size - 1) + [_SPAN_TIE_S])
+    sides = [(at + step, at - step) for step in np.diag(spans)]
+    return np.stack([residual(up) - residual(down) for up, down in sides], axis=1) / (2.0 * spans)
+
+
+def _reach(jacobian: Array, residual: Array, rms: Mapping[str, float]) -> Array:
+    """Return half the 95 % interval of each parameter.
+
+    Two parts, added as variances: scatter, by the fit's linearisation; and what does not average
+    out, because the twin is not the robot to the last digit: a disagreement of each kind as large as
+    `rms` (in its unit, on the windows fitted or held out, the larger) whose signs are those that
+    move the parameter furthest. Windows are few and alike within: Student's t over their number.
+    """
+    # Soft L1's weights, as least_squares applies them.
+    jacobian = jacobian * (1.0 + residual[:, None] ** 2) ** -0.75
+    weighted = residual * (1.0 + residual**2) ** 0.25
     degrees = max(residual.size - jacobian.shape[1], 1)
-    variance = float(residual @ residual) / degrees
-    return np.asarray(1.96 * np.sqrt(variance * np.diag(np.linalg.pinv(jacobian.T @ jacobian))))
+    inverse = np.linalg.pinv(jacobian)
+    variance = float(weighted @ weighted) / degrees * (inverse**2).sum(axis=1)
+    windows = residual.size // sum(_COLUMNS.values())
+    first = 0
+    for name, scale in _SCALES.items():
+        rows = slice(first, first + windows * _COLUMNS[name])
+        variance += (np.abs(inverse[:, rows]).sum(axis=1) * rms[name] / scale) ** 2
+        first = rows.stop
+    return np.asarray(student.ppf(0.975, windows - 1) * np.sqrt(variance))
 
 
 def _rms(parts: Mapping[str, Array]) -> dict[str, float]:

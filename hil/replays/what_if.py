@@ -16,6 +16,7 @@ from hil.analysis.metrics import compute
 from hil.analysis.stats import Paired, paired
 from hil.config.load import with_overrides
 from hil.config.scenario import Scenario, StartPose
+from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME
 from hil.record.source import load_plugins, read_source, recorded_scenario
 from hil.replays.fit import UNITS, Fit, Rehearsal, fit_twin
@@ -24,9 +25,12 @@ from hil.report.repeats import verdict
 from hil.runs.execute import RunSpec, execute_in_memory
 
 if TYPE_CHECKING:
+    from hil.record.manifest import Manifest
     from hil.record.reader import RunRecord
 
 SEEDS = 8
+# What a recorded law is set against when nobody says: the first of these that it is not.
+_USUAL = ("pid", "asg-ism")
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +70,7 @@ class WhatIf:
             "fitted twin, true over believed with 95 % intervals:",
             *(
                 f"  {group}: {value:.3f} ({low:.3f} to {high:.3f})"
+                f"{'' if fit.identifiable(group) else ', not identifiable from this record'}"
                 for group, (value, low, high) in fit.ratios.items()
             ),
             f"residual, RMS over {fit.windows_held_out} windows held out "
@@ -75,8 +80,9 @@ class WhatIf:
                 f"({fit.residual_unfitted[name]:.3g})"
                 for name, unit in UNITS.items()
             ),
+            *(f"  note: {line}" for line in fit.notes),
             f"closed loop on the fitted twin, {SEEDS} seeds, {self.other_law} - "
-            f"{self.recorded_law}:",
+            f"{self.recorded_law}{''.join(f', {change}' for change in self.changes)}:",
         ]
         for name, result in self.answers.items():
             metric = BY_NAME[name]
@@ -91,15 +97,21 @@ class WhatIf:
 
 
 def what_if(
-    path: Path, outer: str | None, overrides: Sequence[str] = (), fit: Fit | None = None
+    path: Path,
+    outer: str | None,
+    overrides: Sequence[str] = (),
+    fit: Fit | None = None,
+    inner: str | None = None,
 ) -> WhatIf:
-    """Fit a twin to a record and run the recorded and the other law on it; raises BadInput.
+    """Fit a twin to a record and run the recorded and another law on it; raises BadInput.
 
-    `fit` is one made of this record before.
+    The other is what `outer`, `inner` and `overrides` make of the recorded one; without any it is
+    the other outer law. `fit` is one made of this record before.
     """
     source = read_source(path)
     manifest = source.manifest
     load_plugins(source)
+    law, wheels = _other_law(manifest, outer, inner, overrides)
     recorded = recorded_scenario(manifest, path)
     rehearsal = Rehearsal(source, recorded)
     fit = fit or fit_twin(rehearsal)
@@ -110,15 +122,14 @@ def what_if(
             "start": StartPose(x_m=x_m, y_m=y_m, theta_rad=theta_rad),
         }
     )
-    law = outer or manifest.outer
     own = _runs(fitted, manifest.outer, manifest.inner)
-    other = _runs(with_overrides(fitted, overrides), law, manifest.inner)
+    other = _runs(with_overrides(fitted, overrides), law, wheels)
     names = list(HEADLINES)
     values = [[_figures(run) for run in runs] for runs in (own, other)]
     return WhatIf(
         fit=fit,
-        recorded_law=manifest.outer,
-        other_law=law,
+        recorded_law=_named(manifest.outer, manifest.inner, wheels),
+        other_law=_named(law, wheels, manifest.inner),
         changes=tuple(overrides),
         in_record=_of_record(source.samples, names),
         answers={
@@ -127,6 +138,30 @@ def what_if(
         },
         ended_early=(_early(own), _early(other)),
     )
+
+
+def _other_law(
+    manifest: Manifest, outer: str | None, inner: str | None, overrides: Sequence[str]
+) -> tuple[str, str]:
+    """Return the outer and the wheel law to run beside the recorded ones."""
+    if outer is None and inner is None and not overrides:
+        others = [law for law in _USUAL if law != manifest.outer]
+        return others[0], manifest.inner
+    found = (outer or manifest.outer, inner or manifest.inner)
+    if found == (manifest.outer, manifest.inner) and not overrides:
+        raise BadInput(
+            f"--fit: {_options(manifest)} is the recorded law itself, a comparison with itself says "
+            "nothing; give another --outer or --inner, or a --set"
+        )
+    return found
+
+
+def _options(manifest: Manifest) -> str:
+    return f"--outer {manifest.outer} --inner {manifest.inner}"
+
+
+def _named(outer: str, inner: str, other_inner: str) -> str:
+    return outer if inner == other_inner else f"{outer} over {inner}"
 
 
 def _runs(scenario: Scenario, outer: str, inner: str) -> list[RunRecord]:

@@ -9,12 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hil.analysis.metrics import Figures, Verdict, check
+from hil.config.control import WaypointReference
+from hil.control.references import unfinished
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME, METRICS, Metric
 from hil.core.text import visible
+from hil.record import layout
+from hil.record.manifest import read_manifest
 from hil.report.target_gap import tier_gap
 
 if TYPE_CHECKING:
@@ -34,6 +39,8 @@ HEADLINES = {
     "theta_dot_variation_rad_s": "command smoothness",
     "pwm_variation_counts": "PWM chatter",
 }
+# Share by which two runs may differ in length and still be set against each other.
+_EQUAL_LENGTH = 0.05
 _EQUAL_RATIO = 1.05
 
 
@@ -52,6 +59,11 @@ class Entry:
         complete = self.run.manifest.outcome == "complete"
         return complete and all(verdict.holds for verdict in self.verdicts)
 
+    @property
+    def judged(self) -> bool:
+        """Say whether the run's figures may be set against those of others."""
+        return is_judged(self.run)
+
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
@@ -68,12 +80,27 @@ class Comparison:
         return all(entry.holds for entry in self.entries)
 
 
+def is_judged(run: RunRecord) -> bool:
+    """Say whether a run's figures are those of its law: it came to its end, in closed loop.
+
+    One that was stopped early looks quick and calm; in a replay the robot goes where the record's
+    commands took it.
+    """
+    return run.manifest.outcome == "complete" and not is_open_loop(run)
+
+
+def is_open_loop(run: RunRecord) -> bool:
+    """Say whether the run was driven by a record's inputs instead of a robot's."""
+    return run.manifest.target.startswith("replay:")
+
+
 def compare_runs(runs: Sequence[RunRecord], least: int = 2) -> Comparison:
     """Return the comparison of `least` or more runs; raises BadInput when their tasks differ."""
     if len(runs) < least:
         raise BadInput(f"compare: {len(runs)} run given, at least {least} are needed")
-    for run in runs[1:]:
+    for run in runs:
         refuse_other_task(runs[0], run)
+        _refuse_other_tape(run)
     entries = tuple(_entry(label, run) for label, run in zip(labels(runs), runs, strict=True))
     first = runs[0].manifest
     description = str(first.scenario.get("description", ""))
@@ -93,6 +120,21 @@ def refuse_other_task(first: RunRecord, other: RunRecord) -> None:
             raise BadInput(
                 f"{other.path}: cannot be compared with {first.path}: scenario {key} differs "
                 f"({_short(there)} against {_short(here)}); compare runs of one scenario"
+            )
+
+
+def _refuse_other_tape(run: RunRecord) -> None:
+    """Raise BadInput when a replay was made of a record of another task than its own."""
+    folder = Path(run.manifest.target.removeprefix("replay:"))
+    if not is_open_loop(run) or not (folder / layout.MANIFEST).is_file():
+        return
+    recorded = read_manifest(folder).scenario
+    for key in ("name", "start", "reference"):
+        if recorded.get(key) != run.manifest.scenario.get(key):
+            raise BadInput(
+                f"{run.path}: is a replay of {folder}, whose scenario {key} is another "
+                f"({_short(recorded.get(key))} against {_short(run.manifest.scenario.get(key))}); its "
+                "figures are of no task: leave it out"
             )
 
 
@@ -127,19 +169,55 @@ def _warnings(entries: Sequence[Entry]) -> list[str]:
         for key, here, there in differences(first.scenario, other.scenario):
             text = f"{key} {_short(there)} against {_short(here)} ({entries[0].label})"
             lines.append(f"{entry.label}: {text}")
+    lines += _lengths(entries)
     bases = {entry.figures.basis for entry in entries if entry.run.samples["t_s"].size}
     if len(bases) > 1:
         lines.append("figures rest on the truth in some runs and on the estimate in others")
     return lines
 
 
+def _lengths(entries: Sequence[Entry]) -> list[str]:
+    """Return a line for each run that covers another time than the first one."""
+    ends_s = [float(entry.run.samples["t_s"][-1]) if entry.run.samples["t_s"].size else 0.0
+              for entry in entries]  # fmt: skip
+    first = entries[0].label
+    return [
+        f"{entry.label}: covers {end_s:.3g} s against {ends_s[0]:.3g} s ({first}): errors, energies and "
+        "variations add up over time and cannot be set against each other"
+        for entry, end_s in zip(entries[1:], ends_s[1:], strict=True)
+        if abs(end_s - ends_s[0]) > _EQUAL_LENGTH * max(end_s, ends_s[0])
+    ]
+
+
 def _flaws(entry: Entry) -> list[str]:
     manifest = entry.run.manifest
     flaws = [*entry.run.problems, *manifest.notes]
+    told = _unfinished(manifest.scenario)
+    if told and told not in flaws:  # records of before notes were kept
+        flaws.append(told)
     if manifest.outcome in {"fault", "interrupted"}:
         detail = f" ({manifest.outcome_detail})" if manifest.outcome_detail else ""
-        flaws.append(f"the run ended by {manifest.outcome}{detail}: figures cover what there is")
+        flaws.append(
+            f"the run ended by {manifest.outcome}{detail}: figures cover what there is, and are not "
+            "set against those of other runs"
+        )
+    if is_open_loop(entry.run):
+        flaws.append(
+            "a replay: the robot went where the record's commands took it (open loop), so its "
+            "figures are not set against those of other runs"
+        )
     return flaws
+
+
+def _unfinished(scenario: Mapping[str, Any]) -> str | None:
+    """Return that a run of this scenario ends before its waypoints do; None when it does not."""
+    if (scenario.get("reference") or {}).get("kind") != "waypoints":
+        return None
+    try:
+        config = WaypointReference.model_validate(scenario["reference"])
+        return unfinished(config, float(scenario["duration_s"]))
+    except (ValueError, TypeError, KeyError, BadInput):  # not one of ours: nothing is known of it
+        return None
 
 
 def differences(
@@ -182,33 +260,53 @@ def _is_never(metric: Metric, value: float) -> bool:
     return metric.name.startswith("settling") and math.isnan(value)
 
 
+def best_entry(comparison: Comparison, metric: Metric) -> int | None:
+    """Return the index of the entry that is better than all others in a figure; None without one."""
+    places = [place for place, entry in enumerate(comparison.entries) if entry.judged]
+    values = [comparison.entries[place].figures.values[metric.name] for place in places]
+    best = better_of(metric, values)
+    return None if best is None else places[best]
+
+
 def findings(comparison: Comparison) -> list[str]:
-    """Return plain sentences: who is better in each headline figure, by how much, how sure."""
+    """Return plain sentences: who is better in each headline figure, by how much, how sure.
+
+    Runs that ended early and replays are told of in the warnings; nothing is found from them.
+    """
     if len(comparison.entries) == 1:
         return ["One run: nothing to compare it with."]
-    if any(not math.isfinite(entry.figures.values["ise_m2_s"]) for entry in comparison.entries):
+    judged = [entry for entry in comparison.entries if entry.judged]
+    if len(judged) < 2:
+        return [
+            f"{len(judged)} of {len(comparison.entries)} runs came to their end in closed loop, 2 are "
+            "needed: nothing can be concluded."
+        ]
+    if any(not math.isfinite(entry.figures.values["ise_m2_s"]) for entry in judged):
         return ["An error is not finite in at least one run: nothing can be concluded."]
-    lines, wins = [], dict.fromkeys((entry.label for entry in comparison.entries), 0)
+    lines, wins, unknown = [], dict.fromkeys((entry.label for entry in judged), 0), 0
     for name, topic in HEADLINES.items():
         metric = BY_NAME[name]
-        values = [entry.figures.values[name] for entry in comparison.entries]
+        values = [entry.figures.values[name] for entry in judged]
         told = ", ".join(
             f"{entry.label} {'never' if _is_never(metric, value) else metric.text(value)}"
-            for entry, value in zip(comparison.entries, values, strict=True)
+            for entry, value in zip(judged, values, strict=True)
         )
         index = better_of(metric, values)
-        if index is None:
+        if sum(math.isfinite(value) or _is_never(metric, value) for value in values) < 2:
+            verdict = "not recorded"
+            unknown += 1
+        elif index is None:
             verdict = "no clear difference"
         else:
-            winner = comparison.entries[index].label
-            wins[winner] += 1
-            verdict = f"{winner} is better{_factor(metric, values, index)}"
+            wins[judged[index].label] += 1
+            verdict = f"{judged[index].label} is better{_factor(metric, values, index)}"
         lines.append(f"{topic[0].upper()}{topic[1:]} ({metric.label}): {told}; {verdict}.")
     score = ", ".join(f"{label} in {count}" for label, count in wins.items())
-    equal = len(HEADLINES) - sum(wins.values())
+    equal = len(HEADLINES) - unknown - sum(wins.values())
+    missing = f", not recorded {unknown}" if unknown else ""
     lines.append(
-        f"Better of {len(HEADLINES)} headline figures: {score}, no clear difference in {equal}. "
-        f"{_certainty(comparison)}"
+        f"Better of {len(HEADLINES)} headline figures: {score}, no clear difference in {equal}"
+        f"{missing}. {_certainty(comparison)}"
     )
     return lines
 
@@ -271,7 +369,7 @@ def text_table(comparison: Comparison) -> Table:
     table.add_column("unit")
     for metric in METRICS:
         values = [entry.figures.values[metric.name] for entry in comparison.entries]
-        best = better_of(metric, values)
+        best = best_entry(comparison, metric)
         cells = [metric.text(value, with_unit=False) for value in values]
         if best is not None:
             cells[best] = f"[bold green]{cells[best]}[/]"

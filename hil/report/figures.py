@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 
 from hil.analysis import metrics
 from hil.core.registries import OUTER_LAWS
+from hil.report import paper
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -148,6 +149,7 @@ class Sheet:
                 handlelength=1.6, loc="upper left", bbox_to_anchor=(0.55 / _WIDTH_IN, 1.01),
             )  # fmt: skip
             self.figure.savefig(out, format="svg", transparent=True, metadata={"Date": None})
+        paper.keep(self.figure, name, _STYLE)
         return _for_page(out.getvalue())
 
 

@@ -19,7 +19,7 @@ from hil.core.text import visible
 from hil.record.manifest import replace_file
 from hil.report import figures as draw
 from hil.report.assumptions import Assumption, assumptions, gain_assumptions
-from hil.report.compare import HEADLINES, Comparison, Entry, better_of, findings
+from hil.report.compare import HEADLINES, Comparison, Entry, best_entry, findings
 from hil.report.repeats_html import repeats_context
 
 if TYPE_CHECKING:
@@ -168,7 +168,7 @@ def _colours(comparison: Comparison) -> list[int]:
 def _cells(comparison: Comparison, name: str) -> list[Context]:
     metric = BY_NAME[name]
     values = [entry.figures.values[name] for entry in comparison.entries]
-    best = better_of(metric, values)
+    best = best_entry(comparison, metric)
     return [
         {"text": metric.text(value, with_unit=False), "best": index == best}
         for index, value in enumerate(values)

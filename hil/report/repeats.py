@@ -1,7 +1,8 @@
 """Repeated runs of one scenario: arms (outer law over inner law), paired by seed.
 
-Seeds that every arm has form the pairs. With both outer and both inner laws the four arms give
-three contrasts per figure: outer law, inner law, and their interaction.
+Runs of one pair of laws with other gains are another arm (hil/report/arms.py). Seeds that every arm
+has form the pairs. With both outer and both inner laws the four arms give three contrasts per
+figure: outer law, inner law, and their interaction.
 """
 
 from __future__ import annotations
@@ -13,20 +14,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hil.analysis.intervals import FEW, coverage_of
 from hil.analysis.stats import Adjusted, Paired, adjusted, paired
 from hil.core.figures import BY_NAME, METRICS, Metric
-from hil.report.compare import differences, shown_cell
+from hil.report.arms import Arm, arm_names, arms_of, by_seed
+from hil.report.compare import differences, is_judged, is_open_loop, shown_cell
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from hil.record.reader import RunRecord
 
-Arm = tuple[str, str]  # outer law, inner law
 Values = dict[Arm, dict[int, float]]  # a figure of each arm by seed
 
-# The first of these that an experiment has is the baseline.
-_BASELINE_ORDER = ("pid", "asg-ism")
+
+_INTERACTION = "interaction"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +38,11 @@ class Contrast:
     name: str
     results: dict[str, Paired]
     at_equal_battery: dict[str, Adjusted]
+
+    @property
+    def is_interaction(self) -> bool:
+        """Say whether it is a difference of differences, whose sides are sums that nobody ran."""
+        return self.name.startswith(_INTERACTION)
 
     def to_json(self) -> dict[str, Any]:
         """Return the contrast for a JSON document."""
@@ -68,21 +75,18 @@ class Repeats:
         }
 
 
-def arm_of(run: RunRecord) -> Arm:
-    """Return the arm a run belongs to."""
-    return run.manifest.outer, run.manifest.inner
-
-
 def repeats_of(runs: Sequence[RunRecord]) -> Repeats | None:
-    """Return the statistics of runs of one scenario; None without two arms and two common seeds."""
-    arms: dict[Arm, dict[int, RunRecord]] = {}
-    for run in runs:
-        arms.setdefault(arm_of(run), {})[run.manifest.seed] = run
-    arms = dict(sorted(arms.items(), key=lambda item: [law_rank(law) for law in item[0]]))
-    common = sorted(set.intersection(*(set(by_seed) for by_seed in arms.values())))
-    if len(arms) < 2 or len(common) < 2:
+    """Return the statistics of runs of one scenario; None without two arms and two common seeds.
+
+    Raises BadInput when two runs of an arm and seed are told apart by nothing.
+    """
+    groups = arms_of(runs)
+    seeds = [{run.manifest.seed for run in group} for group in groups.values()]
+    common = sorted(set.intersection(*seeds))
+    if len(groups) < 2 or len(common) < 2:
         return None
-    names = arm_names(list(arms))
+    names = arm_names(list(groups))
+    arms = {arm: by_seed(names[arm], group) for arm, group in groups.items()}
     paired_runs = {arm: {seed: by_seed[seed] for seed in common} for arm, by_seed in arms.items()}
     figures = {
         arm: {seed: _figures(run) for seed, run in by_seed.items()}
@@ -116,20 +120,6 @@ def repeats_of(runs: Sequence[RunRecord]) -> Repeats | None:
     )
 
 
-def law_rank(law: str) -> tuple[int, str]:
-    """Return what sorts laws so that the baseline comes first."""
-    known = _BASELINE_ORDER.index(law) if law in _BASELINE_ORDER else len(_BASELINE_ORDER)
-    return known, law
-
-
-def arm_names(arms: Sequence[Arm]) -> dict[Arm, str]:
-    """Return what tells the arms apart: the law that varies, or both."""
-    for index in (0, 1):
-        if len({arm[1 - index] for arm in arms}) == 1:
-            return {arm: arm[index] for arm in arms}
-    return {(outer, inner): f"{outer} over {inner}" for outer, inner in arms}
-
-
 # How a question combines the arms of one seed: weights of the arms on each side.
 Sides = tuple[dict[Arm, float], dict[Arm, float]]
 
@@ -142,15 +132,16 @@ def _questions(arms: Sequence[Arm], names: dict[Arm, str]) -> list[tuple[str, Si
     ]
     outers = list(dict.fromkeys(arm[0] for arm in arms))
     inners = list(dict.fromkeys(arm[1] for arm in arms))
-    if len(outers) == 2 and len(inners) == 2 and len(arms) == 4:
+    if len(outers) == 2 and len(inners) == 2 and len({arm[:2] for arm in arms}) == len(arms) == 4:
         (a, b), (c, d) = outers, inners
+        at = {arm[:2]: arm for arm in arms}
         found += [
             (f"outer law: {b} - {a}, mean over the inner laws",
-             ({(a, c): 0.5, (a, d): 0.5}, {(b, c): 0.5, (b, d): 0.5})),
+             ({at[a, c]: 0.5, at[a, d]: 0.5}, {at[b, c]: 0.5, at[b, d]: 0.5})),
             (f"inner law: {d} - {c}, mean over the outer laws",
-             ({(a, c): 0.5, (b, c): 0.5}, {(a, d): 0.5, (b, d): 0.5})),
-            ("interaction: outer difference over the second inner law - over the first",
-             ({(b, c): 1.0, (a, d): 1.0}, {(a, c): 1.0, (b, d): 1.0})),
+             ({at[a, c]: 0.5, at[b, c]: 0.5}, {at[a, d]: 0.5, at[b, d]: 0.5})),
+            (f"{_INTERACTION}: {b} - {a} over {d}, less {b} - {a} over {c}",
+             ({at[b, c]: 1.0, at[a, d]: 1.0}, {at[a, c]: 1.0, at[b, d]: 1.0})),
         ]  # fmt: skip
     return found
 
@@ -168,7 +159,8 @@ def _contrast(
     volts = difference(battery)
     results, at_equal = {}, {}
     for figure, values in by_figure.items():
-        results[figure] = paired(*(arm_values(values, weights) for weights in sides))
+        one, two = (arm_values(values, weights) for weights in sides)
+        results[figure] = paired(one, two)
         item = adjusted(difference(values), volts)
         if item is not None:
             at_equal[figure] = item
@@ -185,8 +177,8 @@ def _battery_v(run: RunRecord) -> float:
 
 
 def _figures(run: RunRecord) -> dict[str, float]:
-    """Return a run's figures; none of a run that ended early, which would look quick and calm."""
-    if run.manifest.outcome != "complete":
+    """Return a run's figures; none of a run that says nothing of its law (see is_judged)."""
+    if not is_judged(run):
         return dict.fromkeys(BY_NAME, math.nan)
     return run.figures().values
 
@@ -200,16 +192,19 @@ def _warnings(
     arms: dict[Arm, dict[int, RunRecord]], names: dict[Arm, str], common: Sequence[int]
 ) -> list[str]:
     lines = []
-    for arm, by_seed in arms.items():
-        alone = sorted(set(by_seed) - set(common))
+    for arm, own in arms.items():
+        alone = sorted(set(own) - set(common))
         if alone:
             lines.append(f"{names[arm]}: {len(alone)} runs without a partner of the same seed")
-        ended = sum(run.manifest.outcome != "complete" for run in by_seed.values())
+        ended = sum(run.manifest.outcome != "complete" for run in own.values())
         if ended:
             lines.append(f"{names[arm]}: {ended} runs ended early; their pairs are left out")
-    lines += _unlike([run for by_seed in arms.values() for run in by_seed.values()])
-    if len(common) < 10:
-        lines.append(f"{len(common)} pairs: an interval from so few is rough")
+        replays = sum(is_open_loop(run) for run in own.values())
+        if replays:
+            lines.append(f"{names[arm]}: {replays} replays (open loop); their pairs are left out")
+    lines += _unlike([run for own in arms.values() for run in own.values()])
+    if len(common) < FEW:
+        lines.append(f"{len(common)} pairs: {coverage_of(len(common)).text()}")
     return lines
 
 
@@ -259,6 +254,8 @@ def _table(repeats: Repeats, contrast: Contrast, figures: Sequence[str]) -> Tabl
         metric, result = BY_NAME[name], contrast.results[name]
         shown = (result.baseline_mean, result.other_mean, result.mean)
         cells = [metric.text(value, with_unit=False) for value in shown]
+        if contrast.is_interaction:
+            cells[:2] = ["", ""]
         ends = (result.interval.low, result.interval.high)
         span = " to ".join(metric.text(value, with_unit=False) for value in ends)
         if result.certain:

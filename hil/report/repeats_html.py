@@ -25,8 +25,8 @@ def repeats_context(repeats: Repeats) -> dict[str, Any]:
     return {
         "intro": (
             f"{len(repeats.seeds)} seeds, each run with every law under the same noise, delays and "
-            f"losses. Runs that met every requirement: {met}. Intervals are BCa bootstrap "
-            "intervals of the mean difference (Student's t below 6 pairs)."
+            f"losses. Runs that met every requirement: {met}. Intervals are 95 % "
+            "intervals of the mean difference: Student's t and the studentised bootstrap."
         ),
         "caption": (
             "Mean of other - baseline in percent of the baseline's mean, with its 95 % interval; "
@@ -51,6 +51,8 @@ def _contrast(contrast: Contrast) -> dict[str, Any]:
             for value in (result.baseline_mean, result.other_mean, result.mean)
         ]
         span = (result.interval.low, result.interval.high)
+        if contrast.is_interaction:
+            text[:2] = ["", ""]
         text.append(" to ".join(metric.text(value, with_unit=False) for value in span))
         text.append(f"{result.effect:.2f}" if math.isfinite(result.effect) else "–")
         text.append(str(result.pairs))
@@ -81,7 +83,7 @@ def forest_figure(repeats: Repeats, name: str) -> str:
         labels = [BY_NAME[key].label for key in HEADLINES] if panel == 0 else []
         axes.set_yticks(range(len(HEADLINES)), labels or [""] * len(HEADLINES))
         axes.set_xlabel("difference in % of the baseline", labelpad=2)
-        title = contrast.name.split(",")[0].split(": outer difference")[0]
+        title = "interaction" if contrast.is_interaction else contrast.name.split(",")[0]
         axes.set_title(title, fontsize=8.5, loc="left")
     return sheet.svg(name)
 

@@ -71,6 +71,8 @@ class CaptureSource:
         self._capture = cv2.VideoCapture(path)
         if not self._capture.isOpened():
             raise BadInput(f"{self._name}: not a video OpenCV can read")
+        # A rotation tag turns the picture and not the lens.
+        self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0.0)
         self._stamp_property = cv2.CAP_PROP_POS_MSEC
         self._queue = FrameQueue()
         self._stop = threading.Event()

@@ -13,8 +13,7 @@ import cv2
 
 from hil.analysis.metrics import LinkStats
 from hil.config.fit import check_fit
-from hil.config.limits import wheel_speed_max_rad_s
-from hil.config.load import check_edges
+from hil.config.limits import check_edges, wheel_speed_max_rad_s
 from hil.control.estimators.geometry import BelievedGeometry
 from hil.control.estimators.making import make_estimator
 from hil.control.laws.hold import HoldAtGoal
@@ -63,6 +62,7 @@ class RunSpec:
     seed: int
     out: Path
     record_camera: bool = False
+    small_video: bool = False
     rerun: bool = True
     command: str = ""
 
@@ -131,6 +131,7 @@ def execute(
                 manifest,
                 plugins=plugins_of(spec),
                 record_camera=spec.record_camera,
+                small_video=spec.small_video,
                 frame_rate_hz=spec.scenario.camera.rate_hz,
                 rerun=spec.rerun,
             )

@@ -1,1 +1,1 @@
-"""Studies over many runs: experiments, campaigns, tuning."""
+"""Studies: many runs, one answer."""

@@ -1,44 +1,42 @@
-"""Several runs side by side in processes of their own: experiments and repeats."""
+"""An experiment: which runs it is made of, which of them are still to do, and what they say."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import multiprocessing
-import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from queue import Empty
 from random import Random
 from typing import TYPE_CHECKING, Any
 
 from hil.config.fit import check_fit
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput
-from hil.record import layout
-from hil.record.manifest import read_manifest, replace_file
+from hil.record.manifest import Manifest, replace_file
 from hil.report.circle import CircleStudy
 from hil.report.compare import compare_runs, refuse_other_task, to_json
 from hil.report.repeats import Repeats, repeats_of
 from hil.rigs.opening import SIMULATED
 from hil.runs.execute import INNER_LAWS, RunSpec, camera_for
 from hil.study import ideal_circle
+from hil.study.side_by_side import manifest_of, still_to_do
+from hil.study.work_folder import (
+    LOCK,
+    SET_ASIDE,
+    is_new,
+    sigterm_stops,
+    sole_writer,
+)
 
 if TYPE_CHECKING:
-    from multiprocessing.queues import Queue
-
     from hil.config.deck import Deck
     from hil.record.reader import RunRecord
     from hil.report.compare import Comparison
 
-Update = Callable[[str, float], None]
 PLAN = "experiment.json"
-_REPORT_PERIOD_S = 0.5
-_POLL_S = 0.1
-
-_news: Queue[tuple[str, float]] | None = None
+REPORT = "report.html"
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,26 +116,38 @@ def _refuse_one_name_twice(deck: Deck, names: Sequence[str]) -> None:
         seen[name.casefold()] = file
 
 
-def claim(folder: Path, specs: Sequence[RunSpec]) -> list[RunSpec]:
+@contextmanager
+def writing(folder: Path) -> Iterator[None]:
+    """Hold an experiment's folder for this process; raises BadInput when another one has it.
+
+    SIGTERM is taken like Ctrl-C meanwhile: running robots are stopped and their records closed.
+    """
+    if not folder.is_dir():  # made, or refused, by `claim`
+        claim(folder, [])
+    with sole_writer(folder / LOCK, f"--out {folder}"), sigterm_stops():
+        yield
+
+
+def claim(
+    folder: Path, specs: Sequence[RunSpec], say: Callable[[str], None] = lambda _text: None
+) -> list[RunSpec]:
     """Make the experiment's folder, or take up an interrupted one; return the runs still to do.
 
-    A run that did not come to its end is set aside and done anew. Raises BadInput when the folder
-    holds anything else than this very experiment (more repeats than before are welcome).
+    A run that did not come to its end, or whose record was damaged since, is set aside and done
+    anew; `say` is told of the latter. Raises BadInput when the folder holds anything else than this
+    very experiment (more repeats than before are welcome).
     """
     plan = {"format": "hil-experiment-1", "runs": [_identity(spec) for spec in specs]}
     path = folder / PLAN
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        _refuse_other_plan(folder, plan)
-    else:
+    if is_new(folder, PLAN):
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise BadInput(f"--out {folder}: cannot be made: {error.strerror}") from None
+    else:
+        _refuse_other_plan(folder, plan, specs, say)
     replace_file(path, json.dumps(plan, indent=1).encode() + b"\n")
-    todo = [spec for spec in specs if not _ended(spec)]
-    for spec in todo:
-        _set_aside(spec.out)
-    return todo
+    return still_to_do(specs, say)
 
 
 def _identity(spec: RunSpec) -> dict[str, Any]:
@@ -154,14 +164,16 @@ def _identity(spec: RunSpec) -> dict[str, Any]:
     }
 
 
-def _refuse_other_plan(folder: Path, plan: dict[str, Any]) -> None:
+def _refuse_other_plan(
+    folder: Path, plan: dict[str, Any], specs: Sequence[RunSpec], say: Callable[[str], None]
+) -> None:
+    known = plan["runs"]
     try:
         old = json.loads((folder / PLAN).read_bytes())["runs"]
     except (OSError, ValueError, KeyError, TypeError):
-        raise BadInput(
-            f"--out {folder}: exists and is neither empty nor an experiment; name a new one"
-        ) from None
-    known = plan["runs"]
+        _refuse_other_records(folder, specs)
+        say(f"{folder / PLAN}: damaged or lost, made anew from the records beside it")
+        return
     for run in old:
         if run not in known:
             raise BadInput(
@@ -170,80 +182,29 @@ def _refuse_other_plan(folder: Path, plan: dict[str, Any]) -> None:
             )
 
 
-def _ended(spec: RunSpec) -> bool:
-    """Say whether the run of a spec is there and came to an end of its own."""
-    if not (spec.out / layout.MANIFEST).is_file():
-        return False
-    return read_manifest(spec.out).outcome in {"complete", "fault"}
+def _refuse_other_records(folder: Path, specs: Sequence[RunSpec]) -> None:
+    """Raise BadInput unless the folder holds records of these specs and nothing else."""
+    runs = {spec.out.name: spec for spec in specs}
+    ours = {PLAN, f"{PLAN}.part", SET_ASIDE, REPORT, LOCK, *runs}
+    found = {item.name for item in folder.iterdir()} if folder.is_dir() else {""}
+    records = [name for name in runs if name in found]
+    if not found <= ours or not (records or PLAN in found):
+        raise BadInput(
+            f"--out {folder}: exists and is neither empty nor an experiment; name a new one"
+        )
+    for name in records:
+        manifest = manifest_of(runs[name].out)
+        if manifest is not None and not _is_of(manifest, runs[name]):
+            raise BadInput(
+                f"--out {folder}: its {PLAN} is damaged and its run {name!r} is not one of this "
+                "command's; give the command that began it, or name a new folder"
+            )
 
 
-def _set_aside(folder: Path) -> None:
-    if not folder.exists():
-        return
-    aside = folder.parent / "set-aside"
-    aside.mkdir(exist_ok=True)
-    number = 1
-    while (target := aside / f"{folder.name}-{number}").exists():
-        number += 1
-    folder.rename(target)
-
-
-def run_name(spec: RunSpec) -> str:
-    """Return the name of a run within its experiment; its folder has the same."""
-    return spec.out.name
-
-
-def run_all(specs: Sequence[RunSpec], update: Update, workers: int | None = None) -> list[Path]:
-    """Run every spec, `workers` at a time (one a core; a real rig: one), return their folders.
-
-    An error in one run ends the others and is raised here.
-    """
-    if not specs:
-        return []
-    context = multiprocessing.get_context("spawn")
-    news: Queue[tuple[str, float]] = context.Queue()
-    simulated = all(not spec.target.startswith("serial") for spec in specs)
-    count = min((workers or os.cpu_count() or 1) if simulated else 1, len(specs))
-    pool = ProcessPoolExecutor(count, context, _start_worker, (news,))
-    try:
-        futures = [pool.submit(_work, spec) for spec in specs]
-        _follow(futures, news, update)
-        return [future.result() for future in futures]
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _follow(
-    futures: Sequence[Future[Path]], news: Queue[tuple[str, float]], update: Update
-) -> None:
-    """Pass on progress until all are done or one has failed."""
-    while not all(future.done() for future in futures):
-        if any(future.done() and future.exception() is not None for future in futures):
-            return
-        try:
-            update(*news.get(timeout=_POLL_S))
-        except Empty:
-            continue
-
-
-def _start_worker(news: Queue[tuple[str, float]]) -> None:
-    """Set a worker process up: progress goes to `news`."""
-    global _news  # noqa: PLW0603 - the pool hands an initialiser's findings on in no other way
-    _news = news
-
-
-def _work(spec: RunSpec) -> Path:
-    """Run one spec in this process."""
-    from hil.runs.execute import execute  # noqa: PLC0415 - in the worker only
-
-    last_s = [0.0]
-
-    def progress(t_s: float) -> None:
-        if _news is not None and t_s >= last_s[0]:
-            last_s[0] = t_s + _REPORT_PERIOD_S
-            _news.put((run_name(spec), t_s))
-
-    return execute(spec, progress).path
+def _is_of(manifest: Manifest, spec: RunSpec) -> bool:
+    names = ("target", "camera", "outer", "inner", "seed")
+    same = all(getattr(manifest, name) == getattr(spec, name) for name in names)
+    return same and manifest.scenario == json.loads(spec.scenario.model_dump_json())
 
 
 @dataclass(frozen=True, slots=True)

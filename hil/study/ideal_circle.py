@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 State = tuple[float, float, float, float, float]  # X, Y, theta, eta1, eta2
 
-# Section 8.9 as tried in control.md section 2. K places the poles of the state feedback at -2, -4
+# Section 8.9 as in docs/control.md section 6. K places the poles of the state feedback at -2, -4
 # (the k1, k2 of the backstepping stages) and -4.
 CIRCLE_LAYER_M_S2 = 0.02
 CIRCLE_GAINS = make_gains(
@@ -48,7 +48,7 @@ CIRCLE_LIMITS = OuterLimits(
     lead_s=0,
 )
 # X, Y, theta, eta1, eta2: 50 mm off the circle's start in X and in Y, heading theta*(0) = 0, and
-# the circle's own speed and turn rate. The first sentence of that is control.md's, the rest follows.
+# the circle's own speed and turn rate. The first sentence of that is the case chosen, the rest follows.
 CIRCLE_START: State = (0.05, 7.95, 0.0, 0.8, 0.03 * 0.1)
 
 
@@ -65,9 +65,12 @@ class Disturbances:
 NO_DISTURBANCE = Disturbances(0.0, 0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class IdealRun:
-    """Signals of one run, one entry a control step; s and psi are NaN for a law without them."""
+    """Signals of one run, one entry a control step; s and psi are NaN for a law without them.
+
+    Printed, it shows its figures and not its thousands of entries.
+    """
 
     t_s: list[float]
     z1_m: list[Vec2]
@@ -76,6 +79,12 @@ class IdealRun:
     s: list[Vec2]
     psi: list[Vec2]
     u: list[Vec2]  # (zeta in m/s^2, u2 in m/s^2)
+
+    def __repr__(self) -> str:
+        return (
+            f"IdealRun({len(self.t_s)} steps to {self.t_s[-1]:.6g} s, ISE {self.ise_m2_s:.4g} m^2 s, "
+            f"worst |delta1| of the last second {self.worst_m(1.0):.4g} m)"
+        )
 
     @property
     def ise_m2_s(self) -> float:
@@ -157,8 +166,8 @@ def run_ideal(
 ) -> IdealRun:
     """Run the loop; ends early once |delta1| exceeds `give_up_m` (the loop has diverged).
 
-    The law runs and the plant steps at `step_s`. 2e-3 s gives the figures of control.md section 2,
-    which were taken at 1e-4 s, to the digits printed there (docs/control.md has both).
+    The law runs and the plant steps at `step_s`. 2e-3 s gives the figures of docs/control.md section 6,
+    which were taken at 1e-4 s, to the digits printed there.
     """
     reference = make_reference(reference_config)
     x = start
@@ -185,7 +194,7 @@ def run_ideal(
 
 
 def run_circle(outer: str, disturbances: Disturbances = Disturbances()) -> IdealRun:
-    """Run section 8.9 with the law `outer`, as tried in control.md section 2 (80 s)."""
+    """Run section 8.9 with the law `outer`, as in docs/control.md section 6 (80 s)."""
     config = CircleReference()
     law = make_outer_law(outer, CIRCLE_GAINS, CIRCLE_LIMITS, config.d0_m)
     return run_ideal(law, config, CIRCLE_START, d0_m=config.d0_m, disturbances=disturbances)

@@ -8,15 +8,16 @@ is judged elsewhere (`hil.study.tuning_verdict`).
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from hil.config.control import PointReference
 from hil.config.events import Disturbance
-from hil.config.load import load_scenario
+from hil.config.load import load_robot, load_scenario
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import Box
 from hil.core.types import wrap_pi
@@ -24,6 +25,7 @@ from hil.record.manifest import replace_file
 
 if TYPE_CHECKING:
     from hil.config.gains import Gains
+    from hil.config.robot import RobotConfig
     from hil.config.scenario import Scenario
 
 Figures = Mapping[str, float]
@@ -59,6 +61,9 @@ PUSHES = (
 )
 
 
+# The robot that PUSHES are meant for.
+PUSHED_ROBOT = "thesis-4wd"
+
 # A late case: what a bad radio and a loaded host make of link and camera, so that gains keep a margin.
 LATE_LINK = {"latency_s": 0.05, "latency_jitter_s": 0.03}
 LATE_CAMERA = {"latency_s": 0.1, "latency_jitter_s": 0.03, "drop_ratio": 0.1}
@@ -70,7 +75,7 @@ Variant = Literal["calm", "pushed", "late", "beside"]
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One run that every candidate makes: a scenario under a variant of it, over a wheel law."""
+    """One run that every candidate makes: a scenario (by name), a variant of it, a wheel law."""
 
     scenario: str
     variant: Variant
@@ -221,8 +226,11 @@ def tune(
     target: str,
     revision: str,
     progress: Callable[[str, float], None] | None = None,
+    more: Mapping[str, str] | None = None,
 ) -> Gains:
     """Return the tuned gains of both laws with their origin; `base` holds what is not searched.
+
+    `more` goes into the origin.
 
     `progress` is told the law and its best cost so far.
     """
@@ -232,7 +240,8 @@ def tune(
         return search(outer, base, evaluate, plan, told)
 
     found = {outer: searched(outer) for outer in SEARCH}
-    return with_origin(base, found, plan, target=target, revision=revision)
+    gains = with_origin(base, found, plan, target=target, revision=revision)
+    return gains.model_copy(update={"origin": gains.origin | dict(more or {})})
 
 
 def near_bounds(gains: Gains) -> list[str]:
@@ -276,26 +285,42 @@ def write_gain_set(path: Path, gains: Gains) -> None:
     for table, values in gains.model_dump().items():
         lines += ["", f"[{table}]"]
         lines += [
-            f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value!r}"
+            f"{key} = {json.dumps(value, ensure_ascii=False)}"
+            if isinstance(value, str)
+            else f"{key} = {value!r}"
             for key, value in values.items()
         ]
     replace_file(path, ("\n".join(lines) + "\n").encode())
 
 
-def case_scenario(case: Case, gains: Gains) -> Scenario:
-    """Return the scenario of a case with `gains` as its tuned set."""
-    scenario = load_scenario(case.scenario)
+def case_scenario(case: Case, gains: Gains, task: Scenario | None = None) -> Scenario:
+    """Return the scenario of a case with `gains` as its tuned set.
+
+    `task` is what the case names, the built-in scenario when it is not given.
+    """
+    scenario = task or load_scenario(case.scenario)
     sets = scenario.control.gains.model_copy(update={"tuned": gains})
     control = scenario.control.model_copy(update={"gains": sets, "gain_set": "tuned"})
     changed: dict[str, object] = {"control": control}
     if case.variant == "pushed":
-        changed["disturbances"] = PUSHES
+        changed["disturbances"] = _pushes(scenario.robot)
     elif case.variant == "late":
         changed["link"] = scenario.link.model_copy(update=LATE_LINK)
         changed["camera"] = scenario.camera.model_copy(update=LATE_CAMERA)
     elif case.variant == "beside":
         changed["start"] = scenario.start.model_copy(update={"theta_rad": _beside(scenario)})
     return scenario.model_copy(update=changed)
+
+
+def _pushes(robot: RobotConfig) -> tuple[Disturbance, ...]:
+    """Return PUSHES for a robot of another size: force by its weight, twist by weight and track."""
+    usual = load_robot(PUSHED_ROBOT)
+    weight = robot.mass_kg / usual.mass_kg
+    ratios = (weight, weight * robot.track_m / usual.track_m)
+    return tuple(
+        push.model_copy(update={"amplitude": push.amplitude * ratio})
+        for push, ratio in zip(PUSHES, ratios, strict=True)
+    )
 
 
 def _beside(scenario: Scenario) -> float:
@@ -310,17 +335,21 @@ def _beside(scenario: Scenario) -> float:
 
 @dataclass(frozen=True, slots=True)
 class OnTarget:
-    """Makes one run of a trial on a target; a run that ends early has no figures."""
+    """Makes one run of a trial on a target; a run that ends early has no figures.
+
+    `tasks` has the scenarios that cases name, where they are not built in.
+    """
 
     target: str
     camera: str
+    tasks: Mapping[str, Scenario] = field(default_factory=dict)
 
     def __call__(self, trial: Trial) -> Figures:
         """Return the figures of one run, which leaves no record behind."""
         from hil.runs.execute import RunSpec, execute_in_memory  # noqa: PLC0415 - the search needs no target
 
         spec = RunSpec(
-            scenario=case_scenario(trial.case, trial.gains),
+            scenario=case_scenario(trial.case, trial.gains, self.tasks.get(trial.case.scenario)),
             target=self.target,
             camera=self.camera,
             outer=trial.outer,

@@ -53,12 +53,14 @@ class Verdict:
         }
 
 
-def held_out_trials(gains: Gains, repeats: int) -> list[Trial]:
+def held_out_trials(
+    gains: Gains, repeats: int, scenarios: Sequence[str] = HELD_OUT_SCENARIOS
+) -> list[Trial]:
     """Return the runs of the held-out tape, both laws with equal seeds."""
     return [
         Trial(outer, gains, Case(scenario, "calm", "asg-ism"), seed)
         for seed in range(HELD_OUT_SEED, HELD_OUT_SEED + repeats)
-        for scenario in HELD_OUT_SCENARIOS
+        for scenario in scenarios
         for outer in SEARCH
     ]
 
@@ -67,7 +69,16 @@ def judge(trials: Sequence[Trial], figures: Sequence[Figures]) -> Verdict:
     """Return the verdict on the runs of a held-out tape."""
     values: dict[str, dict[str, dict[str, list[float]]]] = {
         scenario: {name: {outer: [] for outer in SEARCH} for name in JUDGED}
-        for scenario in (ALL_SCENARIOS, *HELD_OUT_SCENARIOS)
+        for scenario in (ALL_SCENARIOS, *dict.fromkeys(trial.case.scenario for trial in trials))
+    }
+    # The scenarios share their seeds: over all of them it is the seeds that were drawn.
+    tapes = {
+        scenario: [
+            (trial.seed, 0)
+            for trial in trials
+            if trial.outer == "pid" and scenario in {ALL_SCENARIOS, trial.case.scenario}
+        ]
+        for scenario in values
     }
     for trial, found in zip(trials, figures, strict=True):
         known = {**found, "cost": run_cost(found)}
@@ -78,7 +89,8 @@ def judge(trials: Sequence[Trial], figures: Sequence[Figures]) -> Verdict:
         seeds=tuple(dict.fromkeys(trial.seed for trial in trials)),
         differences={
             scenario: {
-                name: paired(by_law["pid"], by_law["asg-ism"]) for name, by_law in table.items()
+                name: paired(by_law["pid"], by_law["asg-ism"], tapes[scenario])
+                for name, by_law in table.items()
             }
             for scenario, table in values.items()
         },
@@ -95,9 +107,9 @@ def judge(trials: Sequence[Trial], figures: Sequence[Figures]) -> Verdict:
 def with_verdict(gains: Gains, verdict: Verdict) -> Gains:
     """Return the gains with what the held-out tape says of their cost in their origin."""
     cost = verdict.differences[ALL_SCENARIOS]["cost"]
+    judged = [name for name in verdict.differences if name != ALL_SCENARIOS]
     told: dict[str, str | int | float] = {
-        "held_out": f"{', '.join(HELD_OUT_SCENARIOS)}, seeds {verdict.seeds[0]} to "
-        f"{verdict.seeds[-1]}",
+        "held_out": f"{', '.join(judged)}, seeds {verdict.seeds[0]} to {verdict.seeds[-1]}",
         "held_out_cost_pid": round(cost.baseline_mean, 4),
         "held_out_cost_asg-ism": round(cost.other_mean, 4),
         "held_out_cost_difference": f"{cost.mean:.4f}, 95 % {cost.interval.low:.4f} to "

@@ -8,8 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from hil.config.limits import check_board
-from hil.config.load import check_edges
+from hil.config.limits import check_board, check_edges
 from hil.core.errors import BadInput
 from hil.core.files import read_text
 from hil.record.manifest import replace_file

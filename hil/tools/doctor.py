@@ -30,8 +30,11 @@ State = Literal["ok", "missing", "note"]
 _DISTRIBUTION = "skid-steer-hil"
 _SOURCE_ROOT = Path(__file__).resolve().parents[2]
 _NATIVE = ("hil.board._firmware", "hil.control.estimators._fused", "sim_twin._native")
+_PIL = "sim_twin._pil"  # built where its headers are; target pil alone needs it
 _ARDUINO_CORE = Path("/usr/share/arduino/hardware/arduino/avr")
 _APT = "Debian: apt install {}"
+_PIL_HINT = "Debian: apt install libsimavr-dev libelf-dev, then .ci/setup again (builds it)"
+_RUNNABLE = "can be run now"
 
 # What a Mega 2560 or its usual copies say on USB; an HC-05 has no USB identity of its own.
 _BOARD_VENDORS = {0x2341: "Arduino", 0x2A03: "Arduino", 0x1A86: "CH340", 0x0403: "FTDI"}
@@ -50,7 +53,7 @@ class Finding:
 
 def examine() -> list[Finding]:
     """Return everything found on this machine."""
-    return [
+    found = [
         *_system(),
         *_packages(),
         *_native_modules(),
@@ -59,6 +62,7 @@ def examine() -> list[Finding]:
         *_ports(),
         *_cameras(),
     ]
+    return [*found, *_runnable(found)]
 
 
 def as_document(findings: list[Finding]) -> dict[str, Any]:
@@ -66,6 +70,7 @@ def as_document(findings: list[Finding]) -> dict[str, Any]:
     return {
         "findings": [asdict(finding) for finding in findings],
         "missing": [f"{f.group}: {f.name}" for f in findings if f.state == "missing"],
+        "can_run_now": [f.name for f in findings if f.group == _RUNNABLE and f.state == "ok"],
     }
 
 
@@ -112,7 +117,7 @@ def _packages() -> Iterator[Finding]:
 
 
 def _native_modules() -> Iterator[Finding]:
-    for name in _NATIVE:
+    for name in (*_NATIVE, _PIL):
         try:
             module = importlib.import_module(name)
         except ImportError as error:
@@ -121,7 +126,7 @@ def _native_modules() -> Iterator[Finding]:
                 name,
                 "missing",
                 str(error),
-                "pip install . (builds it with cmake)",
+                _PIL_HINT if name == _PIL else "pip install . (builds it with cmake)",
             )
             continue
         yield Finding("native modules", name, "ok", str(module.__file__))
@@ -168,6 +173,27 @@ def _toolchain() -> Iterator[Finding]:
         yield Finding(group, "libsimavr", "ok", library)
     yield _folder("libsimavr headers", Path("/usr/include/simavr/sim_avr.h"), "libsimavr-dev")
     yield _folder("libelf headers", Path("/usr/include/libelf.h"), "libelf-dev")
+
+
+def _runnable(found: list[Finding]) -> Iterator[Finding]:
+    """Say which targets can run here as things are, and what keeps the others from it."""
+    lacks = {f.name: f for f in found if f.state == "missing"}
+    devices = {f.group: f.name for f in found if f.state == "ok" and f.hint.startswith("--")}
+    base = [f.name for f in lacks.values() if f.group == "packages"]
+    base += [name for name in _NATIVE if name in lacks]
+    board = [name for name in ("avr-g++", "avr-libc", "arduino core") if name in lacks]
+    simulated = [*board, *(name for name in (_PIL,) if name in lacks)]
+    upload = [*board, *(name for name in ("avrdude",) if name in lacks)]
+    port = [] if "serial ports" in devices else ["a serial port"]
+    camera = [] if "cameras" in devices else ["a camera"]
+    for name, needs in (
+        ("--on twin: runs, experiments, campaigns, replays, reports", base),
+        ("--on pil, hil replay --elf, hil bench firmware", base + simulated),
+        ("hil firmware upload", base + upload + port),
+        ("--on serial:DEV with --camera INDEX", base + port + camera),
+    ):
+        state: State = "note" if needs else "ok"
+        yield Finding(_RUNNABLE, name, state, f"needs {', '.join(needs)}" if needs else "yes")
 
 
 def _viewer() -> Iterator[Finding]:

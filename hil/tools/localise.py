@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import time
 from collections import Counter, deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,12 +30,14 @@ from vision.sources import ImageFolder, VideoFile
 from vision.tracker import Localiser, Tracker
 
 Image = NDArray[np.uint8]
+Look = Callable[[float, Image], PoseMeasurement]
 
 COLUMNS = (
     "frame", "t_s", "seen", "x_m", "y_m", "theta_rad", "quality", "sigma_xy_m", "sigma_theta_rad",
     "window", "contrast_dn", "reason",
 )  # fmt: skip
 TRAIL_POSES = 300
+STILLS_HZ = 1.0  # of an overlay made of stills
 OVERLAY_SUFFIXES = (".avi", ".mkv")
 
 
@@ -46,29 +50,47 @@ class Outputs:
 
 
 def localise(
-    source: Path, camera_file: Path, tag_text: str | None, outputs: Outputs
+    source: Path,
+    camera_file: Path,
+    tag_text: str | None,
+    outputs: Outputs,
+    rate_hz: float | None = None,
 ) -> dict[str, Any]:
-    """Localise every frame and return the summary; raises BadInput and then leaves no file."""
+    """Localise every frame and return the summary; raises BadInput and then leaves no file.
+
+    The images of a folder are stills, each localised for itself; with `rate_hz` they are the frames
+    of a video, in which a pose is expected near the one before.
+    """
     require_place(outputs.rows)
     require_place(outputs.overlay, OVERLAY_SUFFIXES)
+    if rate_hz is not None and not source.is_dir():
+        raise BadInput(
+            f"--rate {rate_hz:g}: {source} has stamps of its own; --rate is for a folder"
+        )
     config = read_camera(camera_file)
-    frames = ImageFolder(source) if source.is_dir() else VideoFile(source)
+    stills = source.is_dir() and rate_hz is None
+    frames = ImageFolder(source, rate_hz or STILLS_HZ) if source.is_dir() else VideoFile(source)
     require_size(config, (frames.width_px, frames.height_px), str(camera_file), str(source))
     model = camera_model(config)
-    tracker = Tracker(_localiser(config, model, tag_text), config.search_radius_m)
+    look = _looker(_localiser(config, model, tag_text), config.search_radius_m, stills)
     rows: list[tuple[Any, ...]] = []
     measured: list[PoseMeasurement] = []
     times_s: list[float] = []
-    with _Overlay(outputs.overlay, model, frames.rate_hz, config.marks.height_m) as overlay:
+    height_m, trail_poses = config.marks.height_m, 1 if stills else TRAIL_POSES
+    overlay_hz = math.nan if outputs.overlay is None else frames.rate_hz
+    with _Overlay(outputs.overlay, model, overlay_hz, height_m, trail_poses) as overlay:
         for frame in frames.frames():
             assert frame.image is not None
             begin_s = time.perf_counter()
-            seen = tracker.step(frame.t_cam_s, frame.image)
+            seen = look(frame.t_cam_s, frame.image)
             times_s.append(time.perf_counter() - begin_s)
             measured.append(seen)
-            rows.append(_row(frame.index, frame.t_cam_s, seen))
+            rows.append(_row(frame.index, None if stills else frame.t_cam_s, seen))
             overlay.add(frame.index, frame.image, seen)
-        document = _summary(source, measured, times_s)
+        document = _summary(source, measured, times_s) | {
+            "taken_as": _taken_as(frames, stills),
+            "unstamped": frames.unstamped,
+        }
         overlay.keep()
     frames.close()
     if outputs.rows is not None:
@@ -77,6 +99,22 @@ def localise(
         "rows": outputs.rows and str(outputs.rows),
         "overlay": outputs.overlay and str(outputs.overlay),
     }
+
+
+def _looker(localiser: Localiser, radius_m: float, stills: bool) -> Look:
+    """Return what finds the robot in a frame: each for itself, or near where it was before."""
+    if stills:
+        return lambda _, image: localiser.locate(image, None, radius_m)
+    return Tracker(localiser, radius_m).step
+
+
+def _taken_as(frames: ImageFolder | VideoFile, stills: bool) -> str:
+    """Return what was assumed of the time between frames."""
+    if stills:
+        return f"{frames.count} stills, each for itself (--rate HZ: frames of a video)"
+    if isinstance(frames, ImageFolder):
+        return f"a video of {frames.rate_hz:g} Hz"
+    return f"a video of about {frames.rate_hz:.4g} Hz"
 
 
 def _localiser(config: CameraConfig, model: CameraModel, tag_text: str | None) -> Localiser:
@@ -96,12 +134,22 @@ def _localiser(config: CameraConfig, model: CameraModel, tag_text: str | None) -
     return TagLocaliser(model, tag, config.marks.height_m)
 
 
-def _row(index: int, t_s: float, seen: PoseMeasurement) -> tuple[Any, ...]:
+def _row(index: int, t_s: float | None, seen: PoseMeasurement) -> tuple[Any, ...]:
     pose = seen.pose
     place = ("", "", "") if pose is None else (pose.x_m, pose.y_m, pose.theta_rad)
     sigma = ("", "") if pose is None else (seen.sigma_xy_m, seen.sigma_theta_rad)
     details = (seen.details.get("window", ""), seen.details.get("contrast_dn", ""))
-    return (index, t_s, int(pose is not None), *place, seen.quality, *sigma, *details, seen.reason)
+    stamp = "" if t_s is None else t_s
+    return (
+        index,
+        stamp,
+        int(pose is not None),
+        *place,
+        seen.quality,
+        *sigma,
+        *details,
+        seen.reason,
+    )
 
 
 def _csv(rows: list[tuple[Any, ...]]) -> str:
@@ -141,10 +189,12 @@ def summary_text(document: dict[str, Any]) -> str:
     d = document
     lines = [
         f"{d['source']}: robot seen in {d['seen']} of {d['frames']} frames ({d['seen_ratio']:.1%}),"
-        f" {d['in_window_ratio']:.0%} of them in the predicted window",
+        f" {d['in_window_ratio']:.0%} of them in the predicted window; taken as {d['taken_as']}",
         f"median quality {d['quality_median']:.2f}, sigma {d['sigma_xy_median_m'] * 1e3:.2f} mm;"
         f" {d['time_median_ms']:.1f} ms a frame, 99 % within {d['time_p99_ms']:.1f} ms",
     ]
+    if d["unstamped"]:
+        lines.append(f"{d['unstamped']} frames with the stamp of the one before were left out")
     lines += [f"not seen in {count}: {reason}" for reason, count in d["not_seen"].items()]
     lines += [f"written to {d[key]}" for key in ("rows", "overlay") if d[key]]
     return "\n".join(lines)
@@ -154,12 +204,17 @@ class _Overlay:
     """Writes frames with the pose and its trail beside the wanted file; `keep` moves it there."""
 
     def __init__(
-        self, path: Path | None, model: CameraModel, rate_hz: float, height_m: float
+        self,
+        path: Path | None,
+        model: CameraModel,
+        rate_hz: float,
+        height_m: float,
+        trail_poses: int,
     ) -> None:
         self._path = path
         self._model = model
         self._height_m = height_m
-        self._trail: deque[Pose | None] = deque(maxlen=TRAIL_POSES)
+        self._trail: deque[Pose | None] = deque(maxlen=trail_poses)
         self._writer: cv2.VideoWriter | None = None
         if path is None:
             return

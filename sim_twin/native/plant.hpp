@@ -1,4 +1,4 @@
-// The robot of control.md section 1 as a differential equation: body, motors, bridge, battery, floor.
+// The robot of docs/twin.md as a differential equation: body, motors, bridge, battery, floor.
 // Frames: world X right, Y up; body x forward, y left; theta counter-clockwise. SI units.
 // Sides: 0 left, 1 right. Positive duty turns the wheels forward.
 #pragma once

@@ -9,10 +9,11 @@ import time
 import pytest
 from click.testing import CliRunner
 
-from hil.cli.bringup import command
+from hil.cli.bringup import Person, command
 from hil.config.events import Fault
 from hil.core.errors import BadInput, RigFault
 from hil.tools.bringup import measure
+from hil.tools.bringup.wiring import Seen
 from hil.tools.serve_twin import TwinServer
 from tests.bringup.rigs import SPEEDS, lifted
 
@@ -61,16 +62,18 @@ def test_planted_faults_are_found_through_a_pseudo_terminal(served, monkeypatch,
     assert max(abs(twin._kernel.state()[i]) for i in SPEEDS) < 0.05
 
 
-def test_nobody_to_answer_is_bad_input():
+def test_nobody_to_answer_is_bad_input(tmp_path):
     """No terminal and no --yes: one line, nothing opened, nothing moved."""
-    run = CliRunner().invoke(command, ["--on", "serial:/dev/none"], input="")
+    (tmp_path / "port").touch()
+    run = CliRunner().invoke(command, ["--on", f"serial:{tmp_path}/port"], input="")
     assert isinstance(run.exception, BadInput)
     assert "--yes" in str(run.exception)
 
 
-def test_wheels_on_the_ground_end_it():
+def test_wheels_on_the_ground_end_it(tmp_path):
     """Any answer but yes: status 2 before the port is opened."""
-    run = CliRunner().invoke(command, ["--on", "serial:/dev/none"], input="n\n")
+    (tmp_path / "port").touch()
+    run = CliRunner().invoke(command, ["--on", f"serial:{tmp_path}/port"], input="n\n")
     assert run.exit_code == 2
     assert "nothing was moved" in run.stderr
 
@@ -82,8 +85,20 @@ def test_the_twin_is_tried_through_its_port():
     assert "hil twin serve --set robot.variant=lifted" in str(run.exception)
 
 
-def test_a_port_that_is_not_there_is_a_rig_fault():
-    """Status 3's error names the port."""
-    run = CliRunner().invoke(command, ["--on", "serial:/dev/none", "--yes"])
+@pytest.mark.parametrize("more", [["--yes"], []])
+def test_a_port_that_is_not_there_is_a_rig_fault(more):
+    """Status 3's error names the port, before any question is asked."""
+    run = CliRunner().invoke(command, ["--on", "serial:/dev/none", *more], input="")
     assert isinstance(run.exception, RigFault)
     assert "/dev/none" in str(run.exception)
+    assert "[y/N]" not in run.stderr
+
+
+def test_an_answer_that_is_none_is_said(monkeypatch, capsys):
+    """An empty line and a word that is no answer: what can be typed is named, and asked again."""
+    answers = iter(["", "left", "lb"])
+    monkeypatch.setattr("builtins.input", lambda: next(answers))
+    assert Person().seen("left") == Seen("left", forward=False)
+    said = capsys.readouterr().err
+    assert "an empty line is none of them; type one of lf, lb, rf, rb, n, ?" in said
+    assert "'left' is none of them" in said

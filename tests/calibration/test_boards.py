@@ -3,13 +3,15 @@
 import re
 import xml.etree.ElementTree as ET
 
+import cv2
 import numpy as np
 import pytest
 
 from hil.core.errors import BadInput
 from tests.calibration.render import at_floor, board_image
-from vision.calibration.boards import Charuco, Chessboard, parse_board
+from vision.calibration.boards import Charuco, Chessboard, not_seen_hint, parse_board
 from vision.calibration.printing import lay_out, to_pdf, to_svg, write_sheet
+from vision.calibration.views import views_of_folder
 
 SVG = "{http://www.w3.org/2000/svg}"
 PX_PER_MM = 4
@@ -27,7 +29,7 @@ def raster(sheet):
     return image
 
 
-@pytest.mark.parametrize("text", ["charuco:8x6:30:22", "chess:10x7:25"])
+@pytest.mark.parametrize("text", ["charuco:8x6:30:22", "charuco-old:8x6:30:22", "chess:10x7:25"])
 def test_what_is_printed_is_what_is_found(text):
     """Corners found on the sheet lie at their board coordinates in mm, measured on the paper."""
     board = parse_board(text)
@@ -122,3 +124,29 @@ def test_paper_too_small_and_wrong_ending(tmp_path):
     with pytest.raises(BadInput, match=r"\.svg or \.pdf"):
         write_sheet(tmp_path / "board.docx", sheet)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("printed", "described"), [(True, "charuco"), (False, "charuco-old")])
+def test_a_board_of_the_other_opencv_is_named(tmp_path, printed, described):
+    """OpenCV's own picture of a board with even rows, described as the other: named; then found."""
+    pattern = cv2.aruco.CharucoBoard(
+        (8, 6), 0.03, 0.022, cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_250)
+    )
+    pattern.setLegacyPattern(printed)
+    (tmp_path / "views").mkdir()
+    picture = cv2.cvtColor(pattern.generateImage((880, 680), None, 40), cv2.COLOR_GRAY2BGR)
+    cv2.imwrite(str(tmp_path / "views" / "board.png"), picture)
+    wrong = parse_board(f"{described}:8x6:30:22")
+    assert wrong.find(picture) is None
+    right = f"{'charuco-old' if printed else 'charuco'}:8x6:30:22"
+    with pytest.raises(BadInput, match=f"the other way round .* {right}"):
+        views_of_folder(wrong, tmp_path / "views", lambda _: None)
+    assert len(parse_board(right).find(picture).px) == 35
+
+
+def test_a_picture_without_a_board_has_no_hint():
+    """Grey, and a board of odd rows, which all versions print alike."""
+    assert (
+        not_seen_hint(parse_board("charuco:8x6:30:22"), np.full((600, 800, 3), 99, np.uint8)) == ""
+    )
+    assert parse_board("charuco:8x5:30:22").other_print() is None

@@ -191,8 +191,10 @@ def test_a_reference_longer_than_the_run_is_said(tmp_path: Path) -> None:
     path = 'reference={kind="waypoints",points_m=[[-0.6,-0.35],[0.3,-0.35],[-0.5,-0.34]]}'
     short = ("--set", "duration_s=0.5", "--set", path)
     done = run_pose(*short, "--json", "--out", tmp_path / "run")
-    assert "and the run ends after 0.5 s" in done.json["notes"][0]
-    assert "note: the reference takes" in run_pose(*short, "--out", tmp_path / "two").out
+    assert "the run ends after 0.5 s" in done.json["notes"][0]
+    assert (
+        "note: reference.points_m: the way takes" in run_pose(*short, "--out", tmp_path / "two").out
+    )
     plain = run_pose("--set", "duration_s=0.5", "--json", "--out", tmp_path / "three")
     assert plain.json["notes"] == []
 

@@ -14,7 +14,7 @@ from tests.cli.command import hil, run_pose
 
 CAUSES = [
     ("camera.drop_ratio=1", "camera: robot seen 0 times"),
-    ("start.x_m=5", "geofence: robot at (5.000"),
+    ("start.x_m=5", "geofence: robot seen at (5.000"),
     ('faults=[{kind="link_cut"}]', ""),
     ('faults=[{kind="camera_stall"}]', "camera: "),
 ]
@@ -57,7 +57,7 @@ def here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Do an experiment's runs in this process, and without section 8.9: both cost seconds."""
     monkeypatch.setattr("hil.study.experiment.circle_study", lambda: None)
     monkeypatch.setattr(
-        "hil.study.experiment.run_all", lambda specs, _: [execute(s) for s in specs]
+        "hil.study.side_by_side.run_all", lambda specs, _: [execute(s) for s in specs]
     )
 
 

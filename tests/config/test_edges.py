@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from hil.config.load import check_edges, load_scenario
+from hil.config.limits import check_edges
+from hil.config.load import load_scenario
 from hil.core.errors import BadInput
 from hil.runs.execute import RunSpec, execute
 
@@ -18,7 +19,7 @@ def test_an_encoder_that_the_board_cannot_count_is_refused_before_the_run(tmp_pa
         target="twin", camera="pose", outer="asg-ism", inner="asg-ism", seed=1,
         out=tmp_path / "run", rerun=False,
     )  # fmt: skip
-    with pytest.raises(BadInput, match=r"44563 counts/s: the board counts up to 31750 counts/s"):
+    with pytest.raises(BadInput, match=r"10000 counts/turn: the board counts up to 31750 counts/s"):
         execute(spec)
     assert not spec.out.exists()
 

@@ -6,7 +6,6 @@ from typing import get_args
 
 import pytest
 
-from hil.config.control import AsgIsmGains, PidGains
 from hil.config.events import TARGET_UNITS, Target
 from hil.config.fields import Setting, settings, told
 from hil.config.limits import board_table
@@ -14,6 +13,8 @@ from hil.config.load import load_robot, load_scenario, put_value
 from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
 from hil.config.sources import built_in_settings
+from hil.control.laws.asg_ism import AsgIsmGains
+from hil.control.laws.state_feedback import PidGains
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME
 from hil.report.assumptions import assumptions, gain_assumptions
@@ -157,4 +158,4 @@ def test_the_built_in_values_come_with_their_sources() -> None:
     assert len(gains) == 2 * (9 + 4)
     assert all(isinstance(item.default, float) for item in gains)
     thesis_k1 = listed["control.gains.thesis.asg_ism.k1_s", ""]
-    assert thesis_k1.source == "not printed; control.md section 2"
+    assert thesis_k1.source == "docs/control.md section 6"

@@ -88,7 +88,8 @@ def test_no_wheel_is_asked_more_than_the_board_takes_and_the_curvature_is_kept(
 @pytest.mark.parametrize("outer", ["asg-ism", "pid"])
 def test_small_wheels_run_at_what_the_board_takes(outer: str) -> None:
     """Wheels of 62 mm: speed and turn together ask 25 rad/s, and the robot reaches its point."""
-    scenario = load_scenario("scenario-1", SMALL_WHEELS)
+    # Later it stands and turns by turns: friction takes what the motors give, and a stall is named.
+    scenario = load_scenario("scenario-1", [*SMALL_WHEELS, "duration_s=16"])
     limits, robot = scenario.control.limits, scenario.robot
     rim_m_s = limits.eta1_max_m_s + 0.5 * robot.track_m * limits.theta_dot_max_rad_s
     assert rim_m_s / robot.wheel_radius_m == pytest.approx(24.94, abs=0.01)
@@ -152,7 +153,8 @@ def _board_after(scenario: Scenario, key: str, value: float) -> dict[str, float]
 
 def test_a_host_value_that_becomes_a_parameter_has_the_parameters_bounds() -> None:
     """Walk all: where a change of a host value changes what the board is given, bounds are one."""
-    scenario = load_scenario("scenario-1")
+    # Slow wheels, so that the board can count whatever encoder there is.
+    scenario = load_scenario("scenario-1", ["board.OVER_W=19", "board.W_MAX=19"])
     before = board_parameters(scenario, "pid")
     shared = {}
     for setting in _host_values(scenario):

@@ -115,7 +115,7 @@ def test_gain_follows_its_formula():
     loop.step_at_speed(0.4, 2.0)  # t = h, E = -2 h: e = -1.6, sgn E = -1
     mu, e, integral = 1.0 / (mu0 + h), -1.6, -2.0 * h
     s = e + mu * (integral + 1.0)
-    # control.md section 4 with Psi = 0 so far: kappa = mu e - mu^2 (E + eta) + mu (sigma sgn E - Psi)
+    # docs/wheel-loop.md with Psi = 0 so far: kappa = mu e - mu^2 (E + eta) + mu (sigma sgn E - Psi)
     kappa = mu * e - mu**2 * (integral + 1.0) - mu * sigma
     eps = eps0 * mu**1.5
     bound = 30.0 + 0.3 * 2.0 + 0.7 * 0.4

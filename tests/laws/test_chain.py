@@ -37,7 +37,7 @@ def is_zero(expression):
 
 
 def closed_form(second_row_sign):
-    """Return A + B v and B; -1 is control.md section 1, +1 is as printed after (2.35)."""
+    """Return A + B v and B; -1 is docs/control.md section 1, +1 is as printed after (2.35)."""
     A = -sp.Matrix([c, s]) * eta1 * eta2**2 / d0**2
     A += sp.Matrix([s, second_row_sign * c]) * 2 * zeta * eta2 / d0
     B = sp.Matrix([[c, eta1 * s / d0], [s, second_row_sign * eta1 * c / d0]])

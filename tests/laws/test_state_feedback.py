@@ -44,7 +44,7 @@ def test_integral_waits_while_saturated_and_removes_a_steady_push():
 
 
 def test_circle_reproduces_the_reported_figures():
-    """control.md section 2: 0.032 against 0.0063 m^2 s, 26 mm against 6.4 mm, ||s|| < 0.0113."""
+    """docs/control.md section 6: 0.032 against 0.0063 m^2 s, 26 mm against 6.4 mm, ||s|| < 0.0113."""
     pid, asg = run_circle("pid"), run_circle("asg-ism")
     assert pid.ise_m2_s == pytest.approx(0.032, abs=0.0005)
     assert asg.ise_m2_s == pytest.approx(0.0063, abs=0.00005)

@@ -2,21 +2,28 @@
 
 import json
 import tomllib
+from importlib.resources import files
 
+import click
 import pytest
 from click.testing import CliRunner
 
+import hil.study.tune_work
 from hil.cli.tune import command
 from hil.config.gains import Gains
 from hil.core.errors import BadInput
+from hil.study.campaign.results import program
+from hil.study.tune import Plan, case_scenario
+from hil.study.tune_work import Journal, identity_of, load_tasks
+from hil.study.work_folder import sole_writer
 from tests.laws.test_tune import STILL, distance
 
 
 class Bowl:
     """Stands in for the twin; a worker process imports it from here."""
 
-    def __init__(self, target, camera):
-        self.name = (target, camera)
+    def __init__(self, target, camera, tasks):
+        self.name = (target, camera, *tasks)
 
     def __call__(self, trial):
         luck = 1e-3 * trial.seed * (trial.outer == "pid")
@@ -63,3 +70,100 @@ def test_a_folder_that_is_not_there_is_named_before_the_search(tmp_path):
         CliRunner().invoke(
             command, ["--out", str(out)], standalone_mode=False, catch_exceptions=False
         )
+
+
+ASKED = ["--candidates", "21", "--held-out", "2", "--workers", "1", "--json"]
+
+
+def test_search_that_was_stopped_goes_on(tmp_path, monkeypatch):
+    """Ctrl-C in mid-search keeps its runs; the same command makes the rest and the same file."""
+    whole, again = tmp_path / "whole.toml", tmp_path / "again.toml"
+    invoke([*ASKED, "--out", str(whole)])
+    made = hil.study.tune_work.Journal.make
+    calls = []
+
+    def stopping(self, trials, run, done):
+        calls.append(len(trials))
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return made(self, trials, run, done)
+
+    monkeypatch.setattr(hil.study.tune_work.Journal, "make", stopping)
+    stopped = invoke([*ASKED, "--out", str(again)], expected=click.Abort)
+    assert "the same command goes on" in stopped.stderr
+    assert not again.exists()
+    journal = tmp_path / "again.toml.search"
+    kept = journal.read_text(encoding="utf-8").splitlines()
+    assert len(kept) == 1 + sum(calls[:2])
+    # A torn last line and a damaged one cost their own runs only.
+    kept[5] = kept[5].replace("1", "2", 1)
+    journal.write_text("\n".join(kept)[:-20], encoding="utf-8")
+    monkeypatch.setattr(hil.study.tune_work.Journal, "make", made)
+    run = invoke([*ASKED, "--out", str(again)])
+    assert "2 damaged lines; their runs are made again" in run.stderr
+    assert f"{sum(calls[:2]) - 2} runs are there already" in run.stderr
+    assert again.read_bytes() == whole.read_bytes()
+    assert sorted(item.name for item in tmp_path.iterdir()) == ["again.toml", "whole.toml"]
+
+
+def test_what_another_search_left_is_not_mixed_in(tmp_path):
+    """Another seed of the search is another search; nor do two commands write one file."""
+    out = tmp_path / "set.toml"
+    tasks = load_tasks((), None)
+    plan = Plan(cases=tasks.cases(), candidates=21)
+    with Journal(tmp_path / "set.toml.search", identity_of(tasks, plan, "pose", program())):
+        pass
+    refused = invoke([*ASKED, "--seed", "2", "--out", str(out)], expected=BadInput)
+    assert "its seed differs: 1, now 2" in str(refused.exception)
+    with sole_writer(tmp_path / "set.toml.lock", "test"):
+        refused = invoke([*ASKED, "--out", str(out)], expected=BadInput)
+    assert "is writing there" in str(refused.exception)
+
+
+def test_gains_for_a_robot_and_tasks_of_ones_own(tmp_path):
+    """A deck of own scenarios with an own robot: cases, verdict and origin are theirs."""
+    robot = files("hil").joinpath("data/robots/thesis-4wd.toml").read_text(encoding="utf-8")
+    heavy = robot.replace('"thesis-4wd"', '"heavy"').replace("mass_kg = 2.8 ", "mass_kg = 5.6 ")
+    (tmp_path / "heavy.toml").write_text(heavy, encoding="utf-8")
+    (tmp_path / "own.toml").write_text(
+        'base = "circle"\nname = "own"\nduration_s = 4\n', encoding="utf-8"
+    )
+    tasks = load_tasks(["scenario-2", str(tmp_path / "own.toml")], str(tmp_path / "heavy.toml"))
+    assert {task.robot.mass_kg for task in tasks.scenarios.values()} == {5.6}
+    cases = [str(case) for case in tasks.cases()]
+    assert len(cases) == len(set(cases)) == 7
+    assert "scenario-2 beside over pid" in cases
+    assert not any(case.startswith("own beside") for case in cases)
+    # Twice the weight is pushed twice as hard.
+    pushed = case_scenario(tasks.cases()[1], tasks.base, tasks.scenarios["scenario-2"])
+    assert [push.amplitude for push in pushed.disturbances] == [6.0, 0.3]
+    (tmp_path / "deck.toml").write_text('scenarios = ["scenario-2"]', encoding="utf-8")
+    out = tmp_path / "set.toml"
+    words = [str(tmp_path / "deck.toml"), "--robot", str(tmp_path / "heavy.toml")]
+    document = json.loads(invoke([*words, *ASKED, "--out", str(out)]).stdout)
+    assert list(document["verdict"]["asg-ism - pid"]) == ["all", "scenario-2"]
+    assert document["gains"]["origin"]["robot"] == "heavy"
+    assert document["gains"]["origin"]["held_out"].startswith("scenario-2, seeds 1000")
+
+
+def test_tasks_that_cannot_be_told_apart_are_refused(tmp_path):
+    """As are a robot and a scenario that are not there."""
+    for words, said in (
+        (["scenario-1", "scenario-1"], "is taken"),
+        (["scenario-9"], "no such file"),
+        (["--robot", "none.toml"], "no such file"),
+        (["--set", "robot.mass_kg=-1"], "mass_kg"),
+    ):
+        out = str(tmp_path / "set.toml")
+        refused = invoke([*words, "--out", out], expected=BadInput)
+        assert said in str(refused.exception)
+    assert not list(tmp_path.iterdir())
+
+
+def invoke(words, expected=None):
+    run = CliRunner().invoke(command, words, standalone_mode=False)
+    if expected is None and run.exception is not None:
+        raise run.exception
+    if expected is not None:
+        assert isinstance(run.exception, expected), run.exception
+    return run

@@ -20,7 +20,7 @@ import pytest
 from hil.core.errors import BadInput
 from hil.record.layout import FRAMES_JOURNAL, SAMPLES_JOURNAL
 from hil.record.manifest import read_manifest
-from hil.record.reader import read_run
+from hil.record.reader import picture_name, read_pictures, read_run
 from hil.record.recorder import Recorder
 from hil.record.schema import FRAME_NAMES, SAMPLE_COLUMNS, SAMPLE_NAMES, trace_row
 from tests.record.synthetic import frame_row, image_of, make_run, manifest, rows
@@ -253,6 +253,45 @@ def test_video_is_lossless_and_stamped(tmp_path):
     assert not video.read()[0]
     assert run.frames["t_arrival_s"].size == len(images)
     assert set(FRAME_NAMES) == set(run.frames)
+
+
+def test_small_video_says_what_it_is(tmp_path):
+    """As JPEG, below a third of the lossless one; frames in order, each within 4 grey levels RMS."""
+    images = {}
+    for small in (False, True):
+        recorder = Recorder(
+            tmp_path / f"run{small}",
+            manifest(),
+            record_camera=not small,
+            small_video=small,
+            rerun=False,
+        )
+        for index, row in enumerate(rows("pid", 1, duration_s=0.5)):
+            frame = frame_row(row[0], index, row)
+            images[index] = image_of(frame)
+            recorder.frame(frame, images[index])
+            recorder.append(row)
+        recorder.close("complete")
+    assert not (tmp_path / "runTrue" / "camera.mkv").exists()
+    small_file = tmp_path / "runTrue" / "camera-small.avi"
+    assert 3 * small_file.stat().st_size < (tmp_path / "runFalse" / "camera.mkv").stat().st_size
+    video = cv2.VideoCapture(str(small_file))
+    for image in images.values():
+        there, back = video.read()
+        assert there
+        assert np.sqrt(np.mean(np.square(back.astype(float) - image))) < 4.0
+    assert not video.read()[0]
+
+
+@pytest.mark.parametrize("t_s", [-12.5, -0.329, 0.0, 0.5, 1234.567])
+def test_no_picture_is_taken_for_an_option(tmp_path, t_s):
+    """A name begins with a letter, and the time is read back from it, as from older names."""
+    for k, name in enumerate((picture_name(t_s), f"{t_s:08.3f}s.jpg")):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        (folder / name).write_bytes(b"")
+        assert [picture.t_s for picture in read_pictures(folder)] == [t_s]
+    assert picture_name(t_s).startswith("t")
 
 
 def test_tick_costs_microseconds(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import signal
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hil.cli.replay import shadow_lines
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput, RigFault
 from hil.core.types import Estimate
@@ -187,6 +189,19 @@ def test_shadow_of_the_other_law_differs_in_commands_only(shared: Path) -> None:
     assert {"est_x_m", "est_theta_rad", "link received", "link sent"} <= same
     assert "eta1_cmd_m_s" not in same
     assert np.isnan(report.samples["s_x_m_s2"]).all()  # PID has no sliding variable
+
+
+def test_shadow_is_told_by_how_far_its_commands_are(shared: Path) -> None:
+    """Both commands and both wheels, RMS and largest in their unit; no figure of 16 digits, no nan."""
+    report = replay(shared, "pid")
+    recorded = read_run(shared).samples["eta1_cmd_m_s"]
+    apart = report.samples["eta1_cmd_m_s"] - recorded
+    lines = shadow_lines(report)
+    rms, most = np.sqrt(np.mean(apart**2)), np.abs(apart).max()
+    assert f"forward speed commanded: {rms:.3g} m/s apart (RMS), {most:.3g} m/s at most" in lines[0]
+    assert "rad/s" in lines[1]
+    assert not any("nan" in line or re.search(r"\d\.\d{7}", line) for line in lines)
+    assert len(lines) == 5
 
 
 def test_altered_command_is_found_where_it_is(own: Path) -> None:

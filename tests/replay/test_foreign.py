@@ -64,7 +64,9 @@ def test_import_is_compared_with_a_run_of_the_twin(tmp_path: Path) -> None:
     """One task: the table stands, and says that the targets differ."""
     write_csv(tmp_path / "log.csv")
     (tmp_path / "map.toml").write_text(CSV_MAP, encoding="utf-8")
-    foreign = import_log(tmp_path / "log.csv", tmp_path / "map.toml", tmp_path / "run", "test")
+    foreign = import_log(
+        tmp_path / "log.csv", tmp_path / "map.toml", tmp_path / "run", "test"
+    ).record
     own = record(tmp_path / "own", ("duration_s=2",))
     found = compare_runs([own, foreign])
     assert any("target" in line for line in found.warnings)
@@ -82,7 +84,7 @@ def test_telemetry_log_of_a_ground_station(tmp_path: Path) -> None:
         ):
             frames.append(struct.pack(">Q", stamp) + message.pack(link))
     (tmp_path / "flight.tlog").write_bytes(b"".join(frames) + b"\0\0torn")
-    run = import_log(tmp_path / "flight.tlog", None, tmp_path / "run", "test")
+    run = import_log(tmp_path / "flight.tlog", None, tmp_path / "run", "test").record
     assert run.samples["est_x_m"][0] == 2.0
     assert run.samples["est_y_m"][0] == 1.0
     assert run.samples["est_theta_rad"][0] == pytest.approx(math.pi / 2)
@@ -105,7 +107,7 @@ def test_own_link_log_gives_set_points(tmp_path: Path) -> None:
         ):
             data += struct.pack(">Q", last + 1000 * k) + message.pack(poses)
     (tmp_path / "both.tlog").write_bytes(data)
-    run = import_log(tmp_path / "both.tlog", None, tmp_path / "run", "test")
+    run = import_log(tmp_path / "both.tlog", None, tmp_path / "run", "test").record
     assert np.isfinite(run.samples["omega_cmd_left_rad_s"]).all()
     assert np.isfinite(run.samples["pwm_left_counts"]).all()
 

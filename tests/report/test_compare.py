@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import math
+import subprocess
+import sys
 
+import numpy as np
 import pytest
 from rich.console import Console
 
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME
 from hil.report.compare import (
+    best_entry,
     better_of,
     compare_runs,
     differences,
@@ -19,6 +24,7 @@ from hil.report.compare import (
     text_table,
     to_json,
 )
+from hil.report.html import render
 from tests.record.synthetic import make_run, scenario
 
 
@@ -123,3 +129,88 @@ def test_json_and_table_hold_every_figure(pair):
     out = io.StringIO()
     Console(file=out, width=120).print(text_table(comparison))
     assert all(metric.label in out.getvalue() for metric in BY_NAME.values())
+
+
+def altered(run, **changes):
+    """Return a run whose manifest says something else."""
+    return dataclasses.replace(run, manifest=run.manifest.model_copy(update=changes))
+
+
+def test_a_run_that_was_stopped_wins_nothing(pair, tmp_path):
+    """A run that ended by a fault is shown, named, and better in nothing; of three, two are judged."""
+    slow, fast = pair
+    stopped = altered(fast, outcome="fault", outcome_detail="camera: robot not seen")
+    comparison = compare_runs([slow, stopped])
+    assert len(findings(comparison)) == 1
+    assert "nothing can be concluded" in findings(comparison)[0]
+    assert any("not set against" in line for line in comparison.warnings)
+    assert all(best_entry(comparison, metric) is None for metric in BY_NAME.values())
+    assert to_json(comparison)["runs"][1]["figures"]["ise_m2_s"]["value"] is not None
+    page = render([comparison], command="test")
+    assert "nothing can be concluded" in page
+    other = make_run(tmp_path / "other", "asg-ism", seed=2, rate_hz=1.5)
+    three = compare_runs([slow, stopped, other])
+    text = "\n".join(findings(three))
+    assert three.entries[1].label not in text
+    assert "is better" in text
+    assert best_entry(three, BY_NAME["ise_m2_s"]) in {0, 2}
+
+
+def test_never_settled_of_a_stopped_run_loses_against_nobody(pair):
+    """A settling time that a stopped run has not reached is no finding either."""
+    stopped = altered(pair[1], outcome="interrupted")
+    assert best_entry(compare_runs([pair[0], stopped]), BY_NAME["settling_20mm_s"]) is None
+
+
+def test_a_replay_is_set_against_nothing(pair):
+    """Its path is the record's, whatever its law commands: no findings, and a note says why."""
+    slow, fast = pair
+    for target in ("replay:somewhere/run", "replay:."):
+        comparison = compare_runs([slow, altered(fast, target=target)])
+        assert "nothing can be concluded" in findings(comparison)[0]
+        assert any("open loop" in line for line in comparison.warnings)
+    both = [altered(run, target="replay:x") for run in pair]
+    assert "0 of 2 runs" in findings(compare_runs(both))[0]
+
+
+def test_figures_that_were_not_recorded_are_not_called_equal(pair):
+    """A log without PWM: its chatter is not recorded, which is no equality."""
+    slow, fast = pair
+    blank = dict(fast.samples)
+    blank["pwm_left_counts"] = np.full_like(blank["t_s"], np.nan)
+    comparison = compare_runs([slow, dataclasses.replace(fast, samples=blank)])
+    text = findings(comparison)
+    assert "not recorded" in next(line for line in text if line.startswith("PWM chatter"))
+    assert "not recorded 1" in text[-1]
+
+
+def test_a_replay_of_another_task_is_refused(pair, tmp_path):
+    """A record of scenario-1 answered for scenario-2: its figures are of neither."""
+    tape = make_run(tmp_path / "tape", "pid")
+    own = altered(pair[1], target=f"replay:{tape.path}")
+    assert len(compare_runs([pair[0], own]).entries) == 2
+    second = make_run(tmp_path / "second", "pid", tree=scenario("scenario-2"))
+    asked = altered(second, target=f"replay:{tape.path}")
+    with pytest.raises(BadInput, match=r"is a replay of .* whose scenario name is another"):
+        compare_runs([second, asked])
+
+
+def test_a_run_shorter_than_its_path_is_named(tmp_path):
+    """Waypoints of a minute in a run of 4 s: the note has both times."""
+    points = ((0.0, 0.0), (3.0, 0.0), (3.0, 3.0))
+    tree = scenario() | {"reference": {"kind": "waypoints", "points_m": points}}
+    runs = [make_run(tmp_path / law, law, tree=tree) for law in ("pid", "asg-ism")]
+    warnings = compare_runs(runs).warnings
+    assert sum("the run ends after 4 s" in line for line in warnings) == 2
+
+
+def test_a_run_says_at_its_start_that_it_ends_too_soon(tmp_path):
+    """`hil run` of a hairpin: one note with the time that the path takes."""
+    hairpin = 'reference={kind="waypoints",points_m=[[-0.6,-0.35],[0.3,-0.35],[-0.5,-0.34]]}'
+    done = subprocess.run(
+        [sys.executable, "-m", "hil", "run", "scenario-1", "--camera", "pose", "--set", hairpin,
+         "--set", "duration_s=1", "--set", "requirements=[]", "--out", str(tmp_path / "run")],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0
+    assert "note: reference.points_m: the way takes" in done.stdout

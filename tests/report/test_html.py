@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 import time
@@ -201,3 +202,65 @@ def test_every_value_of_a_shipped_scenario_says_what_it_means():
     speed = items["control.limits.eta1_max_m_s"]
     assert speed.unit == "m/s"
     assert speed.meaning.startswith("forward speed command")
+
+
+class Structure(HTMLParser):
+    """Collects what a screen reader goes by."""
+
+    def __init__(self):
+        super().__init__()
+        self.headings, self.tags, self.open, self.unnamed = [], [], [], []
+
+    def handle_starttag(self, tag, attrs):
+        given = dict(attrs)
+        self.tags.append((tag, given))
+        if re.fullmatch(r"h[1-6]", tag):
+            self.headings.append(int(tag[1]))
+        if tag == "svg":
+            names = [a.get("aria-label") for t, a in self.open if a.get("role") == "img"]
+            if not any(names):
+                self.unnamed.append(given)
+        if tag in {"div", "main", "figure"}:
+            self.open.append((tag, given))
+
+    def handle_endtag(self, tag):
+        if self.open and self.open[-1][0] == tag:
+            self.open.pop()
+
+
+def test_page_can_be_heard(page):
+    """One main part, headings without gaps, a name for each drawing, header cells with their scope."""
+    found = Structure()
+    found.feed(page)
+    assert [tag for tag, _ in found.tags].count("main") == 1
+    assert found.headings[0] == 1
+    assert found.headings.count(1) == 1
+    assert all(b - a <= 1 for a, b in itertools.pairwise(found.headings))
+    assert sum(tag == "svg" for tag, _ in found.tags) > 5
+    assert not found.unnamed
+    cells = [given for tag, given in found.tags if tag == "th"]
+    assert {given.get("scope") for given in cells} == {"col", "row"}
+    assert all(given.get("alt") for tag, given in found.tags if tag == "img")
+    assert any(tag == "nav" and given.get("aria-label") for tag, given in found.tags)
+
+
+def test_page_fits_a_phone_and_paper(page):
+    """Width of the device; tables and drawings go on sideways within their own box, with a mark."""
+    found = Structure()
+    found.feed(page)
+    assert (
+        "meta",
+        {"name": "viewport", "content": "width=device-width, initial-scale=1"},
+    ) in found.tags
+    boxes = [given for _, given in found.tags if "scroll" in given.get("class", "").split()]
+    assert len(boxes) >= sum(tag in {"table", "svg"} for tag, _ in found.tags)
+    assert all(box["tabindex"] == "0" and box["aria-label"] for box in boxes)
+    assert "goes on to the right" in page
+    assert "@media print" in page
+    assert "@page" in page
+
+
+def test_page_says_where_its_numbers_come_from(page):
+    """The thesis is cited by author, title and year, and the symbols are told."""
+    assert "Alejandra Hernández Sánchez" in page
+    assert "<dt>z1, d0</dt>" in page

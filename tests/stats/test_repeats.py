@@ -14,9 +14,10 @@ import pytest
 from hil.config.deck import Deck
 from hil.core.errors import BadInput
 from hil.record.reader import RunRecord
+from hil.report.compare import HEADLINES
 from hil.report.csv_table import write_csv
 from hil.report.html import render
-from hil.report.repeats import repeats_of
+from hil.report.repeats import repeats_of, text_tables
 from hil.runs.execute import execute, execute_in_memory
 from hil.study.experiment import Conditions, claim, deck_specs, study
 
@@ -56,6 +57,20 @@ def test_matrix_of_laws_gives_every_arm_and_the_three_factors(four_arms: list[Ru
     inner_changed = found.contrasts[0].results[ise].mean
     outer = found.contrasts[3].results[ise].mean
     assert outer == pytest.approx((over_pid + both_changed - inner_changed) / 2)
+
+
+def test_the_interaction_shows_no_run_that_nobody_made(four_arms: list[RunRecord]) -> None:
+    """It is named by its laws, and its sides, sums of two runs, are not shown as values."""
+    found = repeats_of(four_arms)
+    assert found is not None
+    contrast = found.contrasts[-1]
+    assert contrast.is_interaction
+    assert contrast.name == ("interaction: asg-ism - pid over asg-ism, less asg-ism - pid over pid")
+    cells = [list(column.cells) for column in text_tables(found, HEADLINES)[-1].columns]
+    assert set(cells[1]) == set(cells[2]) == {""}
+    assert all(cells[3])
+    others = [list(column.cells) for column in text_tables(found, HEADLINES)[0].columns]
+    assert all(others[1])
 
 
 def test_pairs_met_the_same_noise(four_arms: list[RunRecord]) -> None:

@@ -24,3 +24,10 @@ def always_dies(job: int) -> int:
     """Kill the process."""
     os.kill(os.getpid(), signal.SIGKILL)
     return job
+
+
+def dies_on_three(job: int) -> int:
+    """Kill the process on job 3 each time."""
+    if job == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return job * job

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 import statistics
+import subprocess
+import sys
 from pathlib import Path
 from random import Random
 
 import pytest
+from pydantic import ValidationError
 
 from hil.config.load import builtin_names
 from hil.core.errors import BadInput
@@ -65,7 +68,9 @@ def test_ranges_and_distributions() -> None:
     logs = [math.log10(loguniform.draw(rng)) for _ in range(2000)]
     assert statistics.fmean(logs) == pytest.approx(-1.0, abs=0.05)
     normal = Distribution(kind="normal", mean=1, sd=0.5, low=0)
-    assert min(normal.draw(rng) for _ in range(2000)) == 0
+    drawn = [normal.draw(rng) for _ in range(2000)]
+    assert min(drawn) > 0
+    assert len(set(drawn)) == 2000
 
 
 @pytest.mark.parametrize(
@@ -84,6 +89,34 @@ def test_ranges_and_distributions() -> None:
         ),
         ('[random."robot.mass_kg"]\nkind = "uniform"', "needs low and high"),
         ("[grid", "not valid TOML"),
+        (
+            '[grid]\n"link.latency_s" = [0.02, 0.03]\n"link" = [{baud = 57600}, {baud = 115200}]',
+            "link.latency_s lies in link",
+        ),
+        (
+            '[grid]\n"link" = [{baud = 57600}]\n[random]\n'
+            '"link.loss_ratio" = { kind = "uniform", low = 0.0, high = 0.1 }',
+            "link.loss_ratio lies in link",
+        ),
+        (
+            '[grid]\n"requirements.0.max" = [1.0]\n[[together]]\n"requirements.00.max" = [2.0]',
+            "varied twice",
+        ),
+        ('set = ["link.latency_s=0.1"]\n[grid]\n"link.latency_s" = [0.01]', "is varied as"),
+        ('set = ["link.baud=9600"]\n[grid]\n"link" = [{latency_s = 0.01}]', "is varied as link"),
+        ('[grid]\n"link.latency_s" = []', "at least one value"),
+        ('[[together]]\n"link.latency_s" = []', "at least one value"),
+        ("[[together]]", "an empty table"),
+        ('[grid]\n"link.latency_s" = [0.02, 0.02]', "are the same"),
+        ('[grid]\n"link.baud" = [57600, 57600.0]', "are the same"),
+        ('[grid]\n"link.latency_s" = { first = 0.02, last = 0.02, count = 3 }', "are the same"),
+        (
+            '[[together]]\n"link.latency_s" = [0.02, 0.03, 0.02]\n"link.loss_ratio" = [0, 0.1, 0]',
+            "link.latency_s = 0.02, link.loss_ratio = 0 are the same",
+        ),
+        ('outer = ["pid", "pid"]', "outer: pid is named twice"),
+        ('inner = ["pid", "pid"]', "inner: pid is named twice"),
+        ('figures = ["holds", "holds"]', "figures: holds is named twice"),
     ],
 )
 def test_mistakes_are_named(tmp_path: Path, text: str, said: str) -> None:
@@ -94,8 +127,47 @@ def test_mistakes_are_named(tmp_path: Path, text: str, said: str) -> None:
     assert "\n" not in str(refusal.value)
 
 
+def test_a_value_may_come_again_beside_another(tmp_path: Path) -> None:
+    """Lists in step are rows: one value twice is two points when the row differs."""
+    found = campaign(
+        tmp_path,
+        '[[together]]\n"link.latency_s" = [0.02, 0.02]\n"link.loss_ratio" = [0.0, 0.1]\n'
+        '[grid]\n"link.baud" = [57600]\n"link.latency_jitter_s" = [0.0]',
+    )
+    assert len(found.grid_points()) == 2
+
+
+def test_empty_list_ends_the_command_with_one_line(tmp_path: Path) -> None:
+    """Through the command: status 2, one line, and no folder."""
+    path = tmp_path / "c.toml"
+    path.write_text('scenario = "scenario-1"\n[grid]\n"link.latency_s" = []\n', encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "hil", "sweep", str(path), "--out", str(tmp_path / "s")],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert "link.latency_s = []" in done.stderr
+    assert not (tmp_path / "s").exists()
+
+
 def test_built_in_campaigns_are_sound():
     """Every campaign that ships loads, and the large one has the runs its text promises."""
     found = {name: load_campaign(name) for name in builtin_names("campaigns")}
     assert len(found["limits"].jobs()) == 10_000
     assert all(campaign.file.name == name for name, campaign in found.items())
+
+
+def test_bounded_normal_is_drawn_again_and_not_piled_up() -> None:
+    """Half of it lies below the bound: the mean of the rest is that of the cut-off normal.
+
+    Its density ratio at the bound, a = (0.9 - 1.0) / 0.4 = -0.25: mean 1 + 0.4 phi(a) / (1 - Phi(a)),
+    phi = 0.38667, Phi = 0.40129, which is 1.2583.
+    """
+    bounded = Distribution(kind="normal", mean=1.0, sd=0.4, low=0.9)
+    rng = Random(1)
+    values = [bounded.draw(rng) for _ in range(4000)]
+    assert values.count(0.9) == 0
+    assert statistics.fmean(values) == pytest.approx(1.2583, abs=0.015)
+    with pytest.raises(ValidationError, match="lies within low and high"):
+        Distribution(kind="normal", mean=0.0, sd=0.1, low=1.0)

@@ -10,16 +10,18 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from hil.cli.sweep import program_lines
 from hil.core.errors import BadInput, RigFault
 from hil.core.figures import METRICS
 from hil.runs.execute import RunSpec, execute
+from hil.study.campaign.cluster import on_dask
 from hil.study.campaign.findings import documents, outcomes_of, sentences
 from hil.study.campaign.maps import write_page
 from hil.study.campaign.plan import Campaign, load_campaign
-from hil.study.campaign.results import ResultStore
+from hil.study.campaign.results import ResultStore, program, programs
 from hil.study.campaign.work import Worker, run_campaign
-from hil.study.campaign.workers import in_processes, on_dask
-from tests.sweep.deadly import DiesOnce, always_dies
+from hil.study.campaign.workers import in_processes
+from tests.sweep.deadly import DiesOnce, always_dies, dies_on_three
 
 TEXT = """
 scenario = "scenario-1"
@@ -108,6 +110,63 @@ def test_job_that_kills_every_worker_ends_the_campaign() -> None:
     """Not an endless loop: after five deaths it is said."""
     with pytest.raises(RigFault, match="its worker died 5 times"):
         list(in_processes(always_dies, [1], 1))
+
+
+def test_job_that_kills_its_worker_costs_only_itself() -> None:
+    """It is given up by name; every other job comes once."""
+    results = list(in_processes(dies_on_three, range(8), 2, lambda job, reason: (job, reason)))
+    lost = [item for item in results if isinstance(item, tuple)]
+    assert [job for job, _ in lost] == [3]
+    assert "its worker died 5 times" in lost[0][1]
+    assert sorted(item for item in results if item not in lost) == [0, 1, 4, 16, 25, 36, 49]
+
+
+def test_workers_that_die_whatever_the_job_end_the_campaign() -> None:
+    """Not a campaign of lost runs: after three in a row it is said."""
+    with pytest.raises(RigFault, match="3 runs one after the other"):
+        list(in_processes(always_dies, range(4), 1, lambda job, _reason: job))
+
+
+def test_one_bad_run_is_a_row_and_is_tried_again(
+    campaign: Campaign, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An error of the program names type, text and line; going on runs that row alone."""
+    job = campaign.jobs()[5]
+
+    def fails(_spec: RunSpec) -> None:
+        raise ZeroDivisionError("of two")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("hil.runs.execute.execute_in_memory", fails)
+        row = Worker(campaign)(job).row
+    assert row["outcome"] == "error"
+    assert row["detail"].startswith("ZeroDivisionError: of two (test_work.py:")
+    store = ResultStore(tmp_path / "s", campaign)
+    store.add(row)
+    for other in pq.read_table(finished / "results.parquet").to_pylist():
+        if other["index"] != job.index:
+            store.add(other)
+    store.finish()
+    table, totals = run_campaign(campaign, tmp_path / "s", 1)
+    assert totals.runs_now == 1
+    assert table.equals(pq.read_table(finished / "results.parquet"))
+
+
+def test_rows_say_which_program_made_them(
+    campaign: Campaign, finished: Path, tmp_path: Path
+) -> None:
+    """A folder taken up after an update tells that it mixes rows of two programs."""
+    rows = pq.read_table(finished / "results.parquet").to_pylist()
+    assert {row["program"] for row in rows} == {program()}
+    assert program() in (finished / "campaign.json").read_text(encoding="utf-8")
+    store = ResultStore(tmp_path / "s", campaign)
+    for row in rows:
+        store.add(row | ({"program": "skid-steer-hil 0.0.9"} if row["index"] < 4 else {}))
+    table = store.finish()
+    assert programs(table) == {"skid-steer-hil 0.0.9": 4, program(): 12}
+    (line,) = program_lines(programs(table))
+    assert line.startswith("rows of 2 programs are mixed: 4 by skid-steer-hil 0.0.9, 12 by ")
+    assert program_lines({program(): 16}) == []
 
 
 def test_other_folder_is_left_alone(campaign: Campaign, finished: Path, tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ COLUMNS = ("true_x_m", "true_y_m", "true_theta_rad", "eta1_cmd_m_s", "theta_dot_
 def _exact_camera(monkeypatch: pytest.MonkeyPatch) -> None:
     exact = LocaliserError(
         sigma_xy_m=0, sigma_theta_rad=0, not_seen_ratio=0, outlier_ratio=0, outlier_xy_m=0,
-        outlier_theta_rad=0, quality_ratio=1,
+        outlier_theta_rad=0, quality_ratio=1, place_ratio=0,
     )  # fmt: skip
     monkeypatch.setattr(sim_twin.twin, "load_localiser_error", lambda: exact)
 

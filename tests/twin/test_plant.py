@@ -131,7 +131,7 @@ def test_a_coasting_robot_comes_to_rest_and_stays_there():
     assert abs(later["theta_rad"] - rest["theta_rad"]) < 1e-4
 
 
-def test_scrub_resists_turning_with_the_moment_of_the_specification():
+def test_scrub_resists_turning_with_the_moment_of_the_model():
     """M_r = 2 mu a_f b m g / (a_f + b) = 0.824 N m on (I + m d0^2 + rims W^2/2) = 0.0475 kg m^2."""
     model = plant(ideal_robot(floor_friction_ratio=0.4, **UNPLUGGED))
     moving(model, theta_dot_rad_s=2.0)
@@ -161,7 +161,7 @@ def test_coupling_of_forward_and_turning_motion():
     assert rate["theta_dot_rad_s"] == pytest.approx(MASS * D0 * 0.5 * 2 / INERTIA, rel=1e-9)
 
 
-def test_mass_matrix_is_that_of_the_specification_without_wheel_inertia():
+def test_mass_matrix_is_that_of_the_model_without_wheel_inertia():
     """(S'MS) = diag(m, m + I/d0^2): torque of 1 A a motor gives 29.9 N and 3.24 N m."""
     model = plant(ideal_robot(motor_rotor_inertia_kg_m2=0.0, wheel_inertia_kg_m2=0.0))
     moving(model, current_left_a=-1.0, current_right_a=1.0)

@@ -72,3 +72,40 @@ def test_boards_are_recognised_and_permissions_told(monkeypatch):
     finding = by_name(doctor.examine())["/dev/ttyACM0"]
     assert finding.state == "missing"
     assert "dialout" in finding.hint
+
+
+def runnable(findings):
+    return {f.name: f for f in findings if f.group == "can be run now"}
+
+
+def test_what_can_be_run_now_is_listed(monkeypatch):
+    """A machine with all tools and no board: twin and pil run, a rig needs port and camera."""
+    monkeypatch.setattr(doctor.shutil, "which", lambda name: f"/usr/bin/{name}")
+    monkeypatch.setattr(doctor, "_version_line", lambda *_: "1.0")
+    monkeypatch.setattr(doctor.ctypes.util, "find_library", lambda _: "libsimavr.so")
+    monkeypatch.setattr(doctor, "_folder", lambda name, *_: doctor.Finding("tools", name, "ok", ""))
+    monkeypatch.setattr(
+        doctor.importlib, "import_module", lambda name: SimpleNamespace(__file__=name)
+    )
+    monkeypatch.setattr(list_ports, "comports", list)
+    monkeypatch.setattr(doctor.glob, "glob", lambda _: [])
+    states = [f.state for f in runnable(doctor.examine()).values()]
+    assert states == ["ok", "ok", "note", "note"]
+
+
+def test_target_pil_needs_its_module(monkeypatch):
+    """Without sim_twin._pil: missing, with the way to build it, and pil is not among what can run."""
+    real = doctor.importlib.import_module
+
+    def without(name):
+        if name == "sim_twin._pil":
+            raise ImportError("no module named sim_twin._pil")
+        return real(name)
+
+    monkeypatch.setattr(doctor.importlib, "import_module", without)
+    findings = doctor.examine()
+    assert by_name(findings)["sim_twin._pil"].state == "missing"
+    assert ".ci/setup" in by_name(findings)["sim_twin._pil"].hint
+    lines = runnable(findings)
+    assert "sim_twin._pil" in lines["--on pil, hil replay --elf, hil bench firmware"].detail
+    assert all("pil" not in name for name in doctor.as_document(findings)["can_run_now"])

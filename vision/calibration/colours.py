@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.core.errors import BadInput
+from hil.core.wording import past
 from vision.calibration.tables import read_table
 from vision.cv_compat import read_image
 
@@ -123,14 +124,16 @@ def learn_colours(samples: Sequence[Sample]) -> ColourCalibration:
 def _check(result: ColourCalibration) -> None:
     if result.separation < SEPARATION_MIN:
         raise BadInput(
-            f"colours: front and rear are too alike: separation d' = {result.separation:.1f}, limit"
+            f"colours: front and rear are too alike: separation d' ="
+            f" {past(result.separation, SEPARATION_MIN, '.1f')}, limit"
             f" {SEPARATION_MIN:g}; take marks of other colours, or lower gain and light reflexes"
         )
     for name, ratio in (("front", result.alike_front_ratio), ("rear", result.alike_rear_ratio)):
         if ratio > BACKGROUND_ALIKE_MAX:
             raise BadInput(
-                f"colours: {ratio:.1%} of the other pixels look like the {name} mark, limit"
-                f" {BACKGROUND_ALIKE_MAX:.0%}; take a colour that floor and robot do not have"
+                f"colours: {past(ratio, BACKGROUND_ALIKE_MAX, '.1%')} of the other pixels look"
+                f" like the {name} mark, limit {BACKGROUND_ALIKE_MAX:.0%}; take a colour that floor"
+                " and robot do not have"
             )
 
 
@@ -147,8 +150,8 @@ def grow(image: Image, seed_px: Pixel, what: str) -> Mask:
     seed = np.median(image[v - r : v + r + 1, u - r : u + r + 1].reshape(-1, 3), axis=0)
     if seed.max() < DARK_DN:
         raise BadInput(
-            f"{what}: too dark at ({u}, {v}): {seed.max():.0f} of 255, limit {DARK_DN:g}; lengthen"
-            " the exposure or add light"
+            f"{what}: too dark at ({u}, {v}): {past(seed.max(), DARK_DN, '.0f')} of 255, limit"
+            f" {DARK_DN:g}; lengthen the exposure or add light"
         )
     # Noise would make holes: neighbours are averaged to find the patch, not to learn its colour.
     flat = cv2.blur(image, (3, 3)).reshape(-1, 3).astype(np.float64)
@@ -177,7 +180,7 @@ def _colour(bgr: NDArray[np.uint8], name: str) -> MarkColour:
     clipped = float(np.mean((bgr >= CLIPPED_DN).any(axis=1)))
     if clipped > CLIPPED_SHARE_MAX:
         raise BadInput(
-            f"colours: {clipped:.0%} of the {name} mark is overexposed, limit"
+            f"colours: {past(clipped, CLIPPED_SHARE_MAX, '.0%')} of the {name} mark is overexposed, limit"
             f" {CLIPPED_SHARE_MAX:.0%}; shorten the exposure"
         )
     mean = np.median(bgr.astype(np.float64), axis=0)

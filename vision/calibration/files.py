@@ -19,13 +19,13 @@ from hil.core.errors import BadInput
 from vision.calibration.colours import ColourCalibration
 from vision.calibration.floor import FloorCalibration
 from vision.calibration.intrinsics import LensCalibration
+from vision.calibration.plausible import LENS_NAMES
 from vision.correction import CorrectedCamera
 from vision.cv_compat import write_atomic
 
 Value = int | float | bool | Sequence["Value"]
 
 _HEADER = re.compile(r"^\s*\[([^\[\]]+)\]")
-LENS_NAMES = ("fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3")
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +126,10 @@ def lens_tables(calibration: LensCalibration) -> list[Table]:
         f" {', '.join(dropped) or 'none'}",
         f"residual {calibration.error_px:.3f} px RMS, on held-out views"
         f" {calibration.held_out_px:.3f} px RMS",
+        *[
+            f"{name} shows the board as {like} does: counted once"
+            for name, like in calibration.alike
+        ],
         f"standard deviation of fx {calibration.sigma[0]:.2f} px, of cx"
         f" {calibration.sigma[2]:.2f} px; image covered {calibration.coverage_ratio:.0%}",
     ]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from hil.core.errors import BadInput
+from hil.core.wording import past
 from vision import cv_compat
 from vision.calibration.points import PointPairs
 from vision.camera import CameraModel, distort
@@ -32,6 +33,8 @@ PRIOR_NOISE_PX = 0.3
 PRIOR_SIGMA = {"f": 0.5, "aspect": 0.01, "centre": 0.05, "k": 0.5, "p": 0.003, "k3": 0.2}
 OUTLIER_DEVIATIONS = 6.0
 OUTLIER_MIN_PX = 1.0
+# Of the distance over which the points lie: good surveys leave 0.1 to 0.5 %, a board of other size 4.
+RESIDUAL_MAX_RATIO, RESIDUAL_MAX_MM = 0.02, 20.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +94,20 @@ def calibrate_floor(
     residual_mm = floor_errors_mm(fit.camera, kept)
     held_out_mm = _held_out_mm(kept, fit.pinhole, options)
     return FloorCalibration(fit.camera, kept, residual_mm, held_out_mm, dropped, fit.sigma_height_m)
+
+
+def require_fit(result: FloorCalibration) -> None:
+    """Raise BadInput for points that do not lie where they are said to, against their extent."""
+    world_m = result.pairs.world_m[:, :2]
+    extent_mm = float(np.linalg.norm(np.ptp(world_m, axis=0))) * 1e3
+    limit_mm = min(RESIDUAL_MAX_MM, RESIDUAL_MAX_RATIO * extent_mm)
+    for rms_mm, where in ((result.rms_mm, ""), (result.held_out_rms_mm, " on held-out points")):
+        if not rms_mm <= limit_mm:
+            raise BadInput(
+                f"floor: {past(rms_mm, limit_mm, '.1f')} mm RMS{where}, limit {limit_mm:.4g} mm for"
+                f" points over {extent_mm:.0f} mm; nothing written: check the board's size, places"
+                " and units"
+            )
 
 
 def floor_errors_mm(camera: CameraModel, pairs: PointPairs) -> Array:

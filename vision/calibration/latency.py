@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hil.core.errors import BadInput
+from hil.core.wording import past
 
 Array = NDArray[np.float64]
 
@@ -56,7 +57,7 @@ def measure_latency(
     contrast = float(np.quantile(levels, 0.9) - np.quantile(levels, 0.1))
     if contrast < CONTRAST_MIN_DN:
         raise BadInput(
-            f"latency: the light changes by {contrast:.0f} DN in the image, limit"
+            f"latency: the light changes by {past(contrast, CONTRAST_MIN_DN, '.0f')} DN in the image, limit"
             f" {CONTRAST_MIN_DN:.0f} DN; point the camera at it and darken the room"
         )
     shifts = np.arange(0.0, LATENCY_MAX_S, STEP_S)
@@ -66,8 +67,9 @@ def measure_latency(
     best = int(np.argmax(scores))
     if scores[best] < CORRELATION_MIN:
         raise BadInput(
-            f"latency: brightness follows the switching with a correlation of {scores[best]:.2f},"
-            f" limit {CORRELATION_MIN}; is the light what fills the image's centre?"
+            "latency: brightness follows the switching with a correlation of"
+            f" {past(scores[best], CORRELATION_MIN, '.2f')}, limit {CORRELATION_MIN};"
+            " is the light what fills the image's centre?"
         )
     # Between exposures nothing is seen: equally good shifts form a plateau, whose middle is taken.
     plateau = shifts[scores > scores[best] - 1e-3 * (1.0 - scores.min())]

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from vision.calibration.files import LENS_NAMES
 from vision.calibration.floor import FloorCalibration, error_budget
 from vision.calibration.intrinsics import LensCalibration
+from vision.calibration.plausible import LENS_NAMES
 
 HEIGHT_ADVICE = (
     "focal length and camera height cannot be told apart from floor points: give --camera-height,"
@@ -32,6 +32,7 @@ def lens_document(result: LensCalibration, missed: Sequence[str], file: Path) ->
              "held_out_px": v.held_out_px, "tilt_deg": v.tilt_deg, "dropped": v.dropped}
             for v in result.views
         ],
+        "alike": [{"name": name, "like": like} for name, like in result.alike],
         "not_seen": list(missed),
         "advice": list(result.advice),
     }  # fmt: skip
@@ -42,7 +43,7 @@ def lens_text(result: LensCalibration, missed: Sequence[str], file: Path) -> str
     fx, fy, cx, cy = result.lens[:4]
     lines = [
         f"lens at {result.width_px} x {result.height_px} px: focal length {fx:.2f} x {fy:.2f} px"
-        f" (sigma {result.sigma[0]:.2f}), centre ({cx:.2f}, {cy:.2f}) px",
+        f" (sigma {result.sigma[0]:.2f}, {result.sigma[0] / fx:.1%}), centre ({cx:.2f}, {cy:.2f}) px",
         "distortion k1 k2 p1 p2 k3: " + " ".join(f"{k:.5f}" for k in result.lens[4:]),
         f"residual {result.error_px:.3f} px RMS, on held-out views {result.held_out_px:.3f} px RMS;"
         f" image covered {result.coverage_ratio:.0%}",
@@ -52,6 +53,9 @@ def lens_text(result: LensCalibration, missed: Sequence[str], file: Path) -> str
         for v in result.views
         if v.dropped
     ]
+    if result.alike:
+        names = ", ".join(f"{name} (as {like})" for name, like in result.alike)
+        lines.append(f"counted once, the board in the same place: {names}")
     if missed:
         lines.append(f"board not seen in {', '.join(missed)}")
     lines += [f"to make it better: {advice}" for advice in result.advice]

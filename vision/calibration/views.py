@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,8 +13,8 @@ from numpy.typing import NDArray
 
 from hil.core.errors import BadInput
 from vision import cv_compat
-from vision.calibration.boards import Board, BoardView
-from vision.calibration.intrinsics import advise, coverage, slant_deg
+from vision.calibration.boards import Board, BoardView, not_seen_hint
+from vision.calibration.intrinsics import advise, coverage, distance_px, slant_deg
 from vision.sources import ImageFolder, LiveCamera, VideoFile
 
 Image = NDArray[np.uint8]
@@ -21,6 +22,7 @@ Report = Callable[[str], None]
 
 # A video is looked at this often; a hand needs about so long to bring the board elsewhere.
 LOOKS_PER_S = 5.0
+LOOK_TOLERANCE_S = 0.005  # containers round stamps to milliseconds
 STILL_RATIO = 0.004
 NEW_PLACE_RATIO = 0.06
 NEW_CELLS = 2
@@ -28,11 +30,50 @@ NEW_CELLS = 2
 
 @dataclass(slots=True)
 class Views:
-    """Views of one board at one image size; `missed` names images in which it was not seen."""
+    """Views of one board at one image size; `missed` names images in which it was not seen.
+
+    `faults` has why what was seen in an image is not the board, `looked` the images looked at and
+    `where` names them: "12 images of DIR".
+    """
 
     size_px: tuple[int, int]
     views: list[BoardView] = field(default_factory=list)
     missed: list[str] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+    looked: int = 0
+    where: str = ""
+    hint: str = ""
+
+    def look_for_other(self, board: Board, image: Image) -> None:
+        """Keep what is seen in place of the board, as long as nothing else was."""
+        if not self.views and not self.hint:
+            self.hint = not_seen_hint(board, image)
+
+    def sound(self, view: BoardView | None) -> BoardView | None:
+        """Return the view of the next image if it shows the board described, and count it."""
+        self.looked += 1
+        if view is not None and view.fault:
+            self.faults.append(view.fault)
+            return None
+        return view
+
+    def require(self, count: int) -> Views:
+        """Raise BadInput where fewer views show the board, with what else was seen."""
+        if len(self.views) >= max(count, len(self.faults)):
+            return self
+        if self.faults and len(self.faults) >= len(self.views):
+            most, times = Counter(self.faults).most_common(1)[0]
+            raise BadInput(
+                f"another board than described in {len(self.faults)} of {self.where} ({times} times:"
+                f" {most}); count its squares, not its corners, and give them as --board"
+            )
+        if not self.views:
+            hint = self.hint or "; is it the board described?"
+            raise BadInput(f"board not seen in any of {self.where}{hint}")
+        raise BadInput(
+            f"lens: {len(self.views)} usable views of the board in {self.where}, at least {count} are"
+            " needed; add views from other sides and tilts, or is it another board than described?"
+        )
 
 
 def views_of_folder(board: Board, folder: Path, report: Report) -> Views:
@@ -42,13 +83,20 @@ def views_of_folder(board: Board, folder: Path, report: Report) -> Views:
     for frame in source.frames():
         name = source.files[frame.index].name
         assert frame.image is not None
-        view = board.find(frame.image, name)
-        report(f"{name}: {'board not seen' if view is None else f'{len(view.px)} corners'}")
-        if view is None:
-            found.missed.append(name)
-        else:
+        seen = board.find(frame.image, name)
+        if seen is None:
+            found.look_for_other(board, frame.image)
+        view = found.sound(seen)
+        if view is not None:
+            report(f"{name}: {len(view.px)} corners")
             found.views.append(view)
-    return _require_views(found, f"{len(source.files)} images of {folder}")
+        else:
+            report(
+                f"{name}: {'board not seen' if seen is None else f'not this board: {seen.fault}'}"
+            )
+            found.missed.append(name)
+    found.where = f"{found.looked} images of {folder}"
+    return found.require(1)
 
 
 def views_of_video(board: Board, path: Path, report: Report) -> Views:
@@ -56,20 +104,24 @@ def views_of_video(board: Board, path: Path, report: Report) -> Views:
     source = VideoFile(path)
     found = Views((source.width_px, source.height_px))
     picker = Picker(found.size_px)
-    every = max(1, round(source.rate_hz / LOOKS_PER_S))
-    looked = 0
+    next_look_s = -math.inf
     for frame in source.frames():
-        if frame.index % every:
+        # By stamps and not by number: browsers record at a rate of their own, and do not say which.
+        if frame.t_cam_s < next_look_s - LOOK_TOLERANCE_S:
             continue
+        next_look_s = frame.t_cam_s + 1.0 / LOOKS_PER_S
         assert frame.image is not None
-        looked += 1
         name = f"frame {frame.index} at {frame.t_cam_s:.2f} s"
-        view = picker.offer(board.find(frame.image, name))
+        seen = board.find(frame.image, name)
+        if seen is None:
+            found.look_for_other(board, frame.image)
+        view = picker.offer(found.sound(seen))
         if view is not None:
             found.views.append(view)
             report(f"{name}: view {len(found.views)}, {len(view.px)} corners")
     source.close()
-    return _require_views(found, f"{looked} frames looked at of {path}")
+    found.where = f"{found.looked} frames looked at of {path}"
+    return found.require(1)
 
 
 def views_of_camera(board: Board, camera: LiveCamera, wanted: int, report: Report) -> Views:
@@ -83,18 +135,12 @@ def views_of_camera(board: Board, camera: LiveCamera, wanted: int, report: Repor
             continue
         next_look_s = frame.t_cam_s + 1.0 / LOOKS_PER_S
         assert frame.image is not None
-        view = picker.offer(board.find(frame.image, f"view {len(found.views) + 1}"))
+        view = picker.offer(found.sound(board.find(frame.image, f"view {len(found.views) + 1}")))
         if view is not None:
             found.views.append(view)
             cells = coverage([v.px for v in found.views], found.size_px)
             hints = advise(cells, [slant_deg(v) for v in found.views])
             report(f"{view.name} of {wanted}: {hints[0] if hints else 'enough; more steady it'}")
-    return found
-
-
-def _require_views(found: Views, where: str) -> Views:
-    if not found.views:
-        raise BadInput(f"board not seen in any of {where}; is it the board described?")
     return found
 
 
@@ -112,28 +158,17 @@ class Picker:
         if view is None or previous is None:
             return None
         width_px = self._size_px[0]
-        if _distance_px(view, previous) > STILL_RATIO * width_px or not self._is_new(view):
+        if distance_px(view, previous) > STILL_RATIO * width_px or not self._is_new(view):
             return None
         self._taken.append(view)
         return view
 
     def _is_new(self, view: BoardView) -> bool:
-        if all(_distance_px(view, t) > NEW_PLACE_RATIO * self._size_px[0] for t in self._taken):
+        if all(distance_px(view, t) > NEW_PLACE_RATIO * self._size_px[0] for t in self._taken):
             return True
         before = coverage([t.px for t in self._taken], self._size_px) > 0
         now = coverage([view.px], self._size_px) > 0
         return int(np.sum(now & ~before)) >= NEW_CELLS
-
-
-def _distance_px(a: BoardView, b: BoardView) -> float:
-    """Return the RMS distance of the corners both views show, infinite without common ones."""
-    places = {tuple(p): px for p, px in zip(a.board_m.round(6).tolist(), a.px, strict=True)}
-    pairs = [
-        px - places[tuple(p)]
-        for p, px in zip(b.board_m.round(6).tolist(), b.px, strict=True)
-        if tuple(p) in places
-    ]
-    return float(np.sqrt(np.mean(np.sum(np.square(pairs), axis=1)))) if pairs else float("inf")
 
 
 def floor_images(source: Path) -> Iterator[tuple[str, Image]]:

@@ -1,4 +1,4 @@
-// Super-twisting differentiator of control.md section 3, Levant form of (3.15), (6.15)-(6.16).
+// Super-twisting differentiator of docs/wheel-loop.md, Levant form of (3.15), (6.15)-(6.16).
 #ifndef HIL_CORE_SUPER_TWISTING_H
 #define HIL_CORE_SUPER_TWISTING_H
 

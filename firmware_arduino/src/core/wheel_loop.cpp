@@ -67,7 +67,7 @@ float boundary_layer(Sliding& sl, const WheelTuning& t, float mu) {
   return 1.5f * sl.eps * mu;
 }
 
-// k(t) s / (|s| + eps(t)): (4.12)-(4.16) with the corrections of control.md section 6.
+// k(t) s / (|s| + eps(t)): (4.12)-(4.16) with the corrections of docs/wheel-loop.md.
 float sliding_control(Sliding& sl, const WheelTuning& t, float xb, float xa, float bound) {
   const float mu = sl.mu;
   sl.s = xb + mu * (xa + sl.eta + sl.average);

@@ -1,4 +1,4 @@
-// One side's wheels: speed from the encoder, the two wheel laws of control.md section 4, limits.
+// One side's wheels: speed from the encoder, the two wheel laws of docs/wheel-loop.md, limits.
 // Signs: positive duty, PWM and speed drive forward and make counts rise. Duty is a ratio, -1 to 1.
 #ifndef HIL_CORE_WHEEL_LOOP_H
 #define HIL_CORE_WHEEL_LOOP_H
@@ -38,7 +38,7 @@ struct WheelTuning {
 
 WheelTuning wheel_tuning(const Params& params);
 
-// Sliding variable and the terms it is made of, control.md section 4.
+// Sliding variable and the terms it is made of, docs/wheel-loop.md.
 struct Sliding {
   float t_mu0_s;   // t + mu0; t restarts at arming and when the set-point steps
   float mu;        // 1 / (t + mu0)

@@ -1,7 +1,7 @@
 """The thesis's variant: z2, z3 by super-twisting from the camera's z1 alone, predicted linearly.
 
 Two differentiators in cascade per axis (z1 -> z2 -> z3) and one on the heading, the firmware core's
-own (control.md section 3), stepped at the exposures; wheel counts and commands are not used.
+own (docs/control.md section 4), stepped at the exposures; wheel counts and commands are not used.
 World frame, SI.
 """
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from hil import control
 from hil.config.base import Section, quantity
 from hil.control.laws.chain import Chain, ChainState, restrict
 from hil.control.laws.trace import make_trace
@@ -61,11 +62,6 @@ def power(d: float, d_dot: float, d_ddot: float, k: float, p: float) -> tuple[fl
     return math.copysign(value, d), slope * d_dot, bend * d_dot * d_dot + slope * d_ddot
 
 
-def sign(x: float) -> float:
-    """Return the sub-gradient of |x| used here: -1, 0 or 1."""
-    return 1.0 if x > 0.0 else -1.0 if x < 0.0 else 0.0
-
-
 @OUTER_LAWS.register(
     "asg-ism",
     settings=AsgIsmGains,
@@ -82,18 +78,24 @@ class AsgIsm:
         self._d0 = d0_m
         self._chain = Chain(limits)
         self._t = 0.0
-        self._gamma = (0.0, 0.0)
         self._delta4 = (0.0, 0.0)
-        self._sum_dh = (0.0, 0.0)
+        self._block = control.AsgIsm(
+            k=[gains.alpha_m_s3] * 2,
+            eps_min=[gains.eps_min_m_s2],
+            eps0=gains.eps0_m_s2,
+            beta=gains.beta,
+            mu0_s=gains.mu0_s,
+            sigma=gains.sigma_m_s2,
+        )
 
     def reset(self, reference: ReferenceState, estimate: Estimate) -> None:
         """Start anew: integrals to zero, gamma = -mu0 delta3(0) so that s(0) = 0."""
         z1, z1_ref = estimate.z1_m, reference.z1_m
         self._chain.reset(estimate, (z1_ref[0] - z1[0], z1_ref[1] - z1[1]))
         self._t = 0.0
-        self._delta4 = self._sum_dh = (0.0, 0.0)
+        self._delta4 = (0.0, 0.0)
         delta3, _ = self._backstep(reference, estimate, self._chain.state(estimate))
-        self._gamma = (-self._gains.mu0_s * delta3[0], -self._gains.mu0_s * delta3[1])
+        self._block.reset(self._delta4, delta3)
 
     @property
     def delta4_m_s(self) -> Vec2:
@@ -103,7 +105,8 @@ class AsgIsm:
     @property
     def gamma_m_s(self) -> Vec2:
         """Return gamma of (8.17)."""
-        return self._gamma
+        x, y = self._block.eta
+        return x, y
 
     def _backstep(
         self, reference: ReferenceState, estimate: Estimate, state: ChainState
@@ -132,25 +135,18 @@ class AsgIsm:
         state = self._chain.state(estimate)
         (d3x, d3y), (jx, jy) = self._backstep(reference, estimate, state)
         d4x, d4y = self._delta4
-        sum_x, sum_y = self._sum_dh
-        mu = 1.0 / (self._t + gains.mu0_s)
-        psi_x, psi_y = mu * sum_x, mu * sum_y  # (8.17)
-        ax, ay = mu * (d4x + self._gamma[0]), mu * (d4y + self._gamma[1])
-        sx, sy = d3x + ax + psi_x, d3y + ay + psi_y
-        dh_x, dh_y = gains.sigma_m_s2 * sign(d4x), gains.sigma_m_s2 * sign(d4y)
-        kappa_x = mu * (d3x - ax + dh_x - psi_x)  # (8.20) corrected
-        kappa_y = mu * (d3y - ay + dh_y - psi_y)
-        eps = max(gains.eps0_m_s2 * mu ** (1.0 + gains.beta), gains.eps_min_m_s2)
+        # (8.17), (8.20) corrected, with p = delta4 and q = delta3
+        (sx, sy), kappa, psi, _, (eps, _) = self._block.terms(self._t, (d4x, d4y), (d3x, d3y))
         norm = math.hypot(sx, sy)
         pull = gains.alpha_m_s3 / (norm + eps)
         out = self._chain.command(
-            (jx - kappa_x - pull * sx, jy - kappa_y - pull * sy), state, dt_s
+            (jx - kappa[0] - pull * sx, jy - kappa[1] - pull * sy), state, dt_s
         )  # (8.22) corrected: static, v = B^-1 [...]
         self._t += dt_s
         if not out.saturated:
             self._delta4 = (d4x + d3x * dt_s, d4y + d3y * dt_s)  # (8.13)
-            self._sum_dh = (sum_x + dh_x * dt_s, sum_y + dh_y * dt_s)
+            self._block.advance(dt_s)
         trace = make_trace(
-            state, out, self._d0, s=(sx, sy), psi=(psi_x, psi_y), eps=eps, in_layer=norm <= eps
+            state, out, self._d0, s=(sx, sy), psi=(psi[0], psi[1]), eps=eps, in_layer=norm <= eps
         )
         return OuterCommand(out.eta1, out.w, trace)

@@ -5,7 +5,7 @@ lateral direction, w = theta_dot = -eta2 / d0. In this split the third derivativ
 
     z_dddot = A + B v    is    jerk_e = v1 - eta1 w^2,    jerk_n = 2 zeta w + eta1 w_dot
 
-so that A and B need no matrices; tests prove it against the closed form of control.md section 1.
+so that A and B need no matrices; tests prove it against the closed form of docs/control.md section 1.
 """
 
 from __future__ import annotations

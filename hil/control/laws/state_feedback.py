@@ -1,4 +1,4 @@
-"""The benchmark: state feedback in PID form on the same linearised chain (control.md section 2).
+"""The benchmark: state feedback in PID form on the same linearised chain (docs/control.md section 1).
 
     jerk = z1*_dddot - K_i int delta1 - K_p delta1 - K_d1 delta1_dot - K_d2 delta1_ddot
 

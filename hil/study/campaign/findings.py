@@ -1,21 +1,24 @@
 """What a campaign says: along each varied value, every arm's figures and the paired differences.
 
 Rows of one point, draw and seed are a pair: they met the same noise. Along one value, all others
-are averaged over. Drawn values are grouped into bins of equal count.
+are averaged over. Seeds and draws are common to all points: it is these that the intervals take to
+be drawn at random, and not the pairs. Drawn values are grouped into bins of equal count.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hil.analysis.stats import Interval, Paired, paired, t_interval
+from hil.analysis.intervals import Interval
+from hil.analysis.stats import Paired, Tape, level, paired
 from hil.core.figures import BY_NAME
-from hil.report.repeats import Arm, arm_names, law_rank
+from hil.report.arms import Arm, arm_names, law_rank
 from hil.study.campaign.plan import HOLDS, Campaign, metric_of
 
 if TYPE_CHECKING:
@@ -45,6 +48,7 @@ class Outcomes:
     points: dict[str, NDArray[Any]]
     figures: dict[str, Array]
     complete: NDArray[np.bool_]
+    tapes: tuple[Tape, ...]
 
     @property
     def numeric_axes(self) -> list[str]:
@@ -68,15 +72,18 @@ class Outcomes:
         ]
 
     def level(self, figure: str, arm: int, pairs: NDArray[np.intp]) -> tuple[float, Interval]:
-        """Return an arm's mean over the pairs that have the figure, and its 95 % t interval."""
-        values = self.figures[figure][pairs, arm]
-        known = values[np.isfinite(values)]
-        return (float(known.mean()) if known.size else float("nan")), t_interval(known)
+        """Return an arm's mean over the pairs that have the figure, and its 95 % interval."""
+        return level(self.figures[figure][pairs, arm].tolist(), [self.tapes[i] for i in pairs])
 
     def difference(self, figure: str, arm: int, pairs: NDArray[np.intp]) -> Paired:
         """Return the paired difference of an arm to the baseline."""
         values = self.figures[figure][pairs]
-        return paired(values[:, 0].tolist(), values[:, arm].tolist())
+        return paired(
+            values[:, 0].tolist(),
+            values[:, arm].tolist(),
+            [self.tapes[i] for i in pairs],
+            shares=figure == HOLDS.name,
+        )
 
 
 def outcomes_of(campaign: Campaign, table: pa.Table) -> Outcomes:
@@ -97,6 +104,7 @@ def outcomes_of(campaign: Campaign, table: pa.Table) -> Outcomes:
         {axis: by_pair(axis)[:, 0] for axis in campaign.axes},
         {name: by_pair(name).astype(np.float64)[:, order] for name in (*BY_NAME, HOLDS.name)},
         (by_pair("outcome") == "complete")[:, order],
+        tuple(zip(by_pair("seed")[:, 0].tolist(), by_pair("draw")[:, 0].tolist(), strict=True)),
     )
 
 
@@ -113,11 +121,14 @@ def documents(outcomes: Outcomes) -> Iterator[dict[str, Any]]:
                     "other": outcomes.labels[arm],
                     "baseline": outcomes.labels[0],
                     "stations": [
-                        {"value": station.value}
-                        | outcomes.difference(figure, arm, station.pairs).to_json()
+                        _told(figure, station, outcomes.difference(figure, arm, station.pairs))
                         for station in stations
                     ],
                 }
+
+
+def _told(figure: str, station: Station, result: Paired) -> dict[str, Any]:
+    return {"value": station.value, "verdict": _verdict(figure, result)} | result.to_json()
 
 
 def sentences(outcomes: Outcomes) -> list[str]:
@@ -138,9 +149,16 @@ def sentences(outcomes: Outcomes) -> list[str]:
 
 
 def _verdict(figure: str, result: Paired) -> str:
+    if result.pairs == 0:
+        return "without runs to compare"
+    if math.isnan(result.interval.low):
+        return "known from one seed alone"
     if not result.certain:
         return "not told apart"
-    return "better" if (result.mean < 0) == (metric_of(figure).better == "lower") else "worse"
+    better = metric_of(figure).better
+    if better == "neither":
+        return "lower" if result.mean < 0 else "higher"
+    return "better" if (result.mean < 0) == (better == "lower") else "worse"
 
 
 def short(value: float | str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import itertools
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -27,12 +28,16 @@ figcaption { font-size: .88rem; } pre { white-space: pre-wrap; } li { margin: .2
 """
 
 
-def write_page(path: Path, outcomes: Outcomes, command: str) -> None:
-    """Write the page, atomically; `command` is the command line that made it."""
+def write_page(path: Path, outcomes: Outcomes, command: str, notes: Sequence[str] = ()) -> None:
+    """Write the page, atomically; `command` is the command line that made it.
+
+    `notes` says how runs ended that have no figures, and which program made the rows.
+    """
     file = outcomes.campaign.file
     parts = [
         f"<h1>Campaign {html.escape(file.name)}</h1>",
         f"<p>{html.escape(_described(outcomes))}</p>",
+        *(f"<p>{html.escape(line)}</p>" for line in notes),
         "<ul>",
         *(f"<li>{html.escape(line)}</li>" for line in sentences(outcomes)),
         "</ul>",
@@ -80,11 +85,16 @@ def _figures(outcomes: Outcomes) -> list[str]:
                     map_figure(outcomes, axes[0], axes[1], figure),
                     f"{metric_of(figure).label}: difference to {outcomes.labels[0]} in percent"
                     f"{' of all runs' if figure == HOLDS.name else ' of it'}. Blue: lower, red: "
-                    f"higher; {metric_of(figure).better} is better. A dot marks a 95 % interval "
+                    f"higher{_direction(figure)}. A dot marks a 95 % interval "
                     "without zero.",
                 )
             )
     return found
+
+
+def _direction(figure: str) -> str:
+    better = metric_of(figure).better
+    return "" if better == "neither" else f"; {better} is better"
 
 
 def _captioned(svg: str, caption: str) -> str:

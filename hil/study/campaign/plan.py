@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
+from statistics import NormalDist
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
@@ -24,6 +25,8 @@ from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME, Metric, require_known
 
 Point = dict[str, Any]
+# Share of a normal distribution that has to lie within its bounds: draws outside are drawn again.
+_LEAST_INSIDE = 1e-3
 InnerLawName = Literal["asg-ism", "pid"]
 
 
@@ -66,7 +69,10 @@ class Range(Section):
 
 
 class Distribution(Section):
-    """One value drawn per draw: uniform or log-uniform in low..high, or normal within them."""
+    """One value drawn per draw: uniform or log-uniform in low..high, or normal within them.
+
+    What falls outside low..high of a normal one is drawn again, so the bounds hold no pile of rows.
+    """
 
     kind: Literal["uniform", "loguniform", "normal"]
     low: float = -math.inf
@@ -84,6 +90,14 @@ class Distribution(Section):
             raise ValueError(f"{self.kind} needs low and high")
         if self.kind == "loguniform" and self.low <= 0:
             raise ValueError("loguniform needs low above 0")
+        if self.kind == "normal":
+            bell = NormalDist(self.mean, self.sd)
+            inside = bell.cdf(self.high) - bell.cdf(self.low)
+            if inside < _LEAST_INSIDE:
+                raise ValueError(
+                    f"normal: {inside:.2g} of it lies within low and high, at least "
+                    f"{_LEAST_INSIDE:g} is needed; move mean, or draw uniform"
+                )
         return self
 
     def draw(self, rng: Random) -> float:
@@ -92,7 +106,9 @@ class Distribution(Section):
             return rng.uniform(self.low, self.high)
         if self.kind == "loguniform":
             return math.exp(rng.uniform(math.log(self.low), math.log(self.high)))
-        return min(max(rng.gauss(self.mean, self.sd), self.low), self.high)
+        while not self.low <= (value := rng.gauss(self.mean, self.sd)) <= self.high:
+            continue  # drawn again: cut off at the bound, many rows would share one value
+        return value
 
 
 Axis = Annotated[Range | list[Any], Field(union_mode="left_to_right")]
@@ -123,15 +139,49 @@ class CampaignFile(Section):
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
         names = [*self.grid, *self.random, *itertools.chain(*self.together)]
-        twice = {name for name in names if names.count(name) > 1}
-        if twice:
-            raise ValueError(f"{sorted(twice)[0]} is varied twice")
+        _refuse_overlap(names, [text.partition("=")[0].strip() for text in self.set])
+        lists = [*self.grid.items(), *itertools.chain(*(table.items() for table in self.together))]
+        for name, values in lists:
+            if isinstance(values, list) and not values:
+                raise ValueError(f"{name} = []: at least one value is needed; give some or drop it")
         for table in self.together:
             if len({len(values) for values in table.values()}) != 1:
-                raise ValueError(f"together {', '.join(table)}: lists differ in length")
+                raise ValueError(
+                    f"together {', '.join(table)}: lists differ in length"
+                    if table
+                    else "together: an empty table; name lists in it or drop it"
+                )
+        for key in ("outer", "inner", "figures"):
+            given = getattr(self, key)
+            for value in given:
+                if given.count(value) > 1:
+                    raise ValueError(f"{key}: {value} is named twice; name it once")
         if self.draws > 1 and not self.random:
             raise ValueError("draws: there is nothing to draw without a table `random`")
         return self
+
+
+def _refuse_overlap(varied: Sequence[str], fixed: Sequence[str]) -> None:
+    """Raise ValueError when a value would be put over another: what is recorded were not in force."""
+    paths = [(name, _parts(name)) for name in varied]
+    for pair in itertools.combinations(paths, 2):
+        (outer, short), (inner, long) = sorted(pair, key=lambda item: len(item[1]))
+        if long == short:
+            raise ValueError(f"{outer} is varied twice")
+        if long[: len(short)] == short:
+            raise ValueError(
+                f"{inner} lies in {outer}, and both are varied: the one would replace the other; "
+                f"give {outer} whole, with {inner} in it, or vary its values one by one"
+            )
+    for name, parts in paths:
+        for key in fixed:
+            if _parts(key)[: len(parts)] == parts:
+                raise ValueError(f"set: {key} is varied as {name}; drop one of them")
+
+
+def _parts(name: str) -> tuple[str | int, ...]:
+    """Return the parts of a dotted name, indices as numbers."""
+    return tuple(int(part) if part.isdecimal() else part for part in name.split("."))
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,7 +274,32 @@ def load_campaign(name_or_path: str) -> Campaign:
     for axis, values in _all_values(campaign).items():
         for value in values:
             campaign.scenario([(axis, value)])
+    for axis, grid in file.grid.items():
+        _refuse_twice(campaign, [[(axis, value)] for value in _values(grid)], path)
+    for lists in file.together:
+        rows = zip(*lists.values(), strict=True)
+        _refuse_twice(campaign, [list(zip(lists, row, strict=True)) for row in rows], path)
     return campaign
+
+
+def _refuse_twice(
+    campaign: Campaign, points: Sequence[Sequence[tuple[str, Any]]], path: Path
+) -> None:
+    """Raise BadInput when two of the points are one: their runs would be copies of each other."""
+    seen: dict[str, Sequence[tuple[str, Any]]] = {}
+    for point in points:
+        try:
+            key = campaign.scenario(point).model_dump_json()
+        except BadInput:  # refused together only: such rows say so by themselves
+            continue
+        if key in seen:
+            told = " and ".join(
+                ", ".join(f"{name} = {value}" for name, value in one) for one in (seen[key], point)
+            )
+            raise BadInput(
+                f"{path}: {told} are the same; give each value once, more seeds for more runs"
+            )
+        seen[key] = point
 
 
 def _checked(tree: dict[str, Any], path: Path) -> CampaignFile:

@@ -3,27 +3,44 @@
 campaign.json        the campaign with its resolved scenario; tells whether a folder is its own
 parts/*.parquet      rows as they came; what is in them need not be run again
 results.parquet      all rows in the order of the campaign: a row a run, a column a value
+set-aside/           files that could not be read; their rows are run again
 """
 
 from __future__ import annotations
 
+import functools
 import json
 import math
+from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from hil.core.errors import BadInput
+from hil import __version__
+from hil.core.errors import BadInput, RigFault
 from hil.core.figures import METRICS
-from hil.record.manifest import replace_file
+from hil.record.manifest import git_revision, replace_file
 from hil.study.campaign.plan import Campaign, Job
+from hil.study.work_folder import LOCK, SET_ASIDE, is_new, set_aside
 
 Row = dict[str, Any]
-CAMPAIGN, PARTS, RESULTS = "campaign.json", "parts", "results.parquet"
+CAMPAIGN, PARTS, RESULTS, PAGE = "campaign.json", "parts", "results.parquet", "report.html"
+# Outcome of a run that raised or killed its workers: no answer, and tried again when going on.
+ERROR = "error"
+_OURS = {CAMPAIGN, PARTS, RESULTS, PAGE, SET_ASIDE, LOCK}
 _PART_ROWS = 200
+_DIGEST = b"campaign_sha256"
+_UNKNOWN = "unknown"
+
+
+@functools.cache
+def program() -> str:
+    """Return version and source revision of what makes rows in this process."""
+    return f"skid-steer-hil {__version__} {git_revision()}".strip()
 
 
 def schema_of(campaign: Campaign) -> pa.Schema:
@@ -37,6 +54,7 @@ def schema_of(campaign: Campaign) -> pa.Schema:
     fields += [(name, pa.string()) for name in ("outer", "inner", "outcome", "detail")]
     fields += [("holds", pa.bool_()), ("t_end_s", pa.float64())]
     fields += [(metric.name, pa.float64()) for metric in METRICS]
+    fields += [("program", pa.string())]
     return pa.schema(fields, metadata={"campaign_sha256": campaign.digest})
 
 
@@ -45,27 +63,33 @@ def _is_number(value: object) -> bool:
 
 
 class ResultStore:
-    """The folder of one campaign; takes rows and keeps them safe."""
+    """The folder of one campaign; takes rows and keeps them safe.
+
+    `notes` says in one line each what was found damaged and is made anew.
+    """
 
     def __init__(self, folder: Path, campaign: Campaign) -> None:
         self.folder = folder
+        self.notes: list[str] = []
         self._schema = schema_of(campaign)
         self._claim(campaign)
         self._rows: list[Row] = []
         done = self.table()
-        self.done: set[int] = set(done.column("index").to_pylist())
+        outcomes = zip(
+            *(done.column(name).to_pylist() for name in ("index", "outcome")), strict=True
+        )
+        self.done: set[int] = {index for index, outcome in outcomes if outcome != ERROR}
 
     def _claim(self, campaign: Campaign) -> None:
         """Make the folder, or take up this campaign's own; anything else is refused untouched."""
         path = self.folder / CAMPAIGN
-        if self.folder.exists() and (not self.folder.is_dir() or any(self.folder.iterdir())):
-            try:
-                digest = json.loads(path.read_bytes())["sha256"]
-            except (OSError, ValueError, KeyError, TypeError):
+        if not is_new(self.folder, CAMPAIGN):
+            digest = self._digest_on_disk()
+            if digest is None:
                 raise BadInput(
                     f"--out {self.folder}: exists and is neither empty nor a campaign; "
                     "name a new one"
-                ) from None
+                )
             if digest != campaign.digest:
                 raise BadInput(
                     f"--out {self.folder}: is another campaign, or its file or scenario was "
@@ -73,14 +97,41 @@ class ResultStore:
                 )
         try:
             (self.folder / PARTS).mkdir(parents=True, exist_ok=True)
+            for leftover in self.folder.rglob("*.part"):  # cut off while it was written
+                leftover.unlink()
+            tree = {
+                "sha256": campaign.digest,
+                "programs": list(dict.fromkeys([*_programs_on_disk(path), program()])),
+                "campaign": campaign.file.model_dump(mode="json"),
+                "scenario": campaign.base,
+            }
+            replace_file(path, json.dumps(tree, indent=1).encode() + b"\n")
         except OSError as error:
             raise BadInput(f"--out {self.folder}: cannot be made: {error.strerror}") from None
-        tree = {
-            "sha256": campaign.digest,
-            "campaign": campaign.file.model_dump(mode="json"),
-            "scenario": campaign.base,
-        }
-        replace_file(path, json.dumps(tree, indent=1).encode() + b"\n")
+
+    def _digest_on_disk(self) -> str | None:
+        """Return the SHA-256 of the campaign in the folder, None when it holds none.
+
+        A campaign.json that a crash left damaged is made anew when the rows beside it are ours.
+        """
+        path = self.folder / CAMPAIGN
+        try:
+            return str(json.loads(path.read_bytes())["sha256"])
+        except (OSError, ValueError, KeyError, TypeError):
+            names = {item.name for item in self.folder.iterdir()} if self.folder.is_dir() else {""}
+            if not {name.removesuffix(".part") for name in names} <= _OURS:
+                return None
+        found = self._schema.metadata[_DIGEST].decode() if path.exists() else None
+        for file in self._files():
+            with suppress(OSError, pa.ArrowException, KeyError):
+                found = str((pq.read_schema(file).metadata or {})[_DIGEST], "ascii")
+        if found is not None:
+            self.notes.append(f"{path}: damaged or lost, made anew")
+        return found
+
+    def _files(self) -> list[Path]:
+        files = [self.folder / RESULTS, *sorted((self.folder / PARTS).glob("*.parquet"))]
+        return [file for file in files if file.is_file()]
 
     def add(self, row: Row) -> None:
         """Take one row."""
@@ -97,33 +148,80 @@ class ResultStore:
         self._rows.clear()
 
     def table(self) -> pa.Table:
-        """Return every row on disk in the order of the campaign, each once."""
-        files = [self.folder / RESULTS, *sorted((self.folder / PARTS).glob("*.parquet"))]
-        tables = [pq.read_table(file).cast(self._schema) for file in files if file.is_file()]
+        """Return every row on disk in the order of the campaign, each once.
+
+        A file that cannot be read is set aside and noted: its rows are missing then.
+        """
+        tables = [table for file in self._files() if (table := self._read(file)) is not None]
         whole = pa.concat_tables(tables) if tables else self._schema.empty_table()
-        seen: set[int] = set()
-        keep = []
+        keep: dict[int, int] = {}
+        outcomes = whole.column("outcome").to_pylist()
         for place, index in enumerate(whole.column("index").to_pylist()):
-            if index not in seen:
-                seen.add(index)
-                keep.append((index, place))
-        return whole.take(pa.array([place for _, place in sorted(keep)], pa.int64()))
+            if index not in keep or outcomes[keep[index]] == ERROR:
+                keep[index] = place
+        return whole.take(pa.array([keep[index] for index in sorted(keep)], pa.int64()))
+
+    def _read(self, file: Path) -> pa.Table | None:
+        try:
+            table = pq.ParquetFile(file, page_checksum_verification=True).read()
+            if "program" not in table.column_names:
+                names = pa.array([_UNKNOWN] * table.num_rows, pa.string())
+                table = table.append_column("program", names)
+            return table.select(self._schema.names).cast(self._schema)
+        except (OSError, pa.ArrowException, KeyError, ValueError) as error:
+            aside = set_aside(file, self.folder)
+            self.notes.append(
+                f"{file}: damaged ({str(error).partition(chr(10))[0]}); moved to {aside}, its rows "
+                "are run again"
+            )
+            return None
 
     def finish(self) -> pa.Table:
         """Put all rows into one file and return them; the parts go."""
         self.flush()
         table = self.table().combine_chunks()
         _write(self.folder / RESULTS, table)
-        for part in (self.folder / PARTS).glob("*.parquet"):
+        for part in (self.folder / PARTS).iterdir():
             part.unlink()
         (self.folder / PARTS).rmdir()
         return table
 
 
+def programs(table: pa.Table) -> dict[str, int]:
+    """Return the programs that made the rows of a table, and how many each."""
+    return dict(Counter(table.column("program").to_pylist()))
+
+
+def early_ends(table: pa.Table) -> dict[str, dict[str, Any]]:
+    """Return how the runs without figures ended: by outcome their count and commonest cause."""
+    ends: dict[str, Counter[str]] = {}
+    rows = zip(*(table.column(name).to_pylist() for name in ("outcome", "detail")), strict=True)
+    for outcome, detail in rows:
+        if outcome != "complete":
+            ends.setdefault(outcome, Counter())[detail] += 1
+    return {
+        outcome: {"runs": causes.total(), "commonest_cause": causes.most_common(1)[0][0]}
+        for outcome, causes in ends.items()
+    }
+
+
+def _programs_on_disk(path: Path) -> list[str]:
+    try:
+        return [str(name) for name in json.loads(path.read_bytes()).get("programs", [])]
+    except (OSError, ValueError, TypeError, AttributeError):
+        return []
+
+
 def _write(path: Path, table: pa.Table) -> None:
     part = path.with_name(f"{path.name}.part")
-    pq.write_table(table, part, compression="zstd")
-    part.replace(path)
+    try:
+        pq.write_table(table, part, compression="zstd", write_page_checksum=True)
+        part.replace(path)
+    except OSError as error:
+        raise RigFault(
+            f"{path}: cannot be written: {error.strerror or error}; the rows before are kept, the "
+            "same command goes on"
+        ) from None
 
 
 def row_of(
@@ -148,4 +246,5 @@ def row_of(
         "holds": holds,
         "t_end_s": t_end_s,
         **values,
+        "program": program(),
     }

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import os
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.config.fit import check_fit
-from hil.core.errors import BadInput
+from hil.core.errors import BadInput, RigFault
+from hil.study.campaign.cluster import PROGRAM, on_dask
 from hil.study.campaign.plan import Campaign, Job
-from hil.study.campaign.results import ResultStore, Row, row_of
-from hil.study.campaign.workers import in_processes, on_dask
+from hil.study.campaign.results import CAMPAIGN, ERROR, ResultStore, Row, row_of
+from hil.study.campaign.workers import in_processes
+from hil.study.work_folder import LOCK, is_new, sigterm_stops, sole_writer
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -62,14 +65,22 @@ class Worker:
 
 
 def run_job(campaign: Campaign, job: Job) -> Row:
-    """Run one job in memory and return its row."""
-    from hil.runs.execute import RunSpec, execute_in_memory  # noqa: PLC0415 - in the worker only
-
+    """Run one job in memory and return its row; whatever one run does is its row's outcome."""
     try:
-        scenario = campaign.scenario(job.point)
-        check_fit(scenario)
+        return _run(campaign, job)
     except BadInput as error:  # a combination of values, each of them allowed by itself
         return row_of(job, "refused", str(error), False, 0.0, [])
+    except RigFault:  # the target cannot be had on this machine, for no job
+        raise
+    except Exception as error:
+        return row_of(job, ERROR, _where(error), False, 0.0, [])
+
+
+def _run(campaign: Campaign, job: Job) -> Row:
+    from hil.runs.execute import RunSpec, execute_in_memory  # noqa: PLC0415 - in the worker only
+
+    scenario = campaign.scenario(job.point)
+    check_fit(scenario)
     file = campaign.file
     record = execute_in_memory(
         RunSpec(
@@ -87,26 +98,68 @@ def run_job(campaign: Campaign, job: Job) -> Row:
     return row_of(job, "complete", "", holds, end_s, list(record.figures().values.items()))
 
 
+def _where(error: Exception) -> str:
+    """Return what an error of the program itself says, and the line that raised it."""
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    said = str(error).partition("\n")[0]
+    return f"{type(error).__name__}: {said} ({Path(frame.filename).name}:{frame.lineno})"
+
+
+def _lost(job: Job, reason: str) -> Done:
+    return Done(row_of(job, ERROR, reason, False, 0.0, []), 0.0)
+
+
 def run_campaign(
     campaign: Campaign,
     folder: Path,
     workers: int | None = None,
     dask: str | None = None,
     progress: Progress | None = None,
+    say: Callable[[str], None] = lambda _text: None,
 ) -> tuple[pa.Table, Totals]:
     """Do what is still to do of a campaign and return all its rows, sorted.
 
-    `workers` processes of this machine (one a core), or the Dask cluster at address `dask`.
+    `workers` processes of this machine (one a core), or the Dask cluster at address `dask`. `say`
+    is told what was found damaged, and what is waited for. Raises BadInput for a folder that is not
+    this campaign's or has a writer already, RigFault when the workers or the cluster go away; what
+    came until then is kept.
     """
-    store = ResultStore(folder, campaign)
+    if not is_new(folder, CAMPAIGN) and not (folder / CAMPAIGN).exists():
+        ResultStore(folder, campaign)  # refuses it before a lock is put there
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInput(f"--out {folder}: cannot be made: {error.strerror}") from None
+    with sole_writer(folder / LOCK, f"--out {folder}"), sigterm_stops():
+        return _go_on(ResultStore(folder, campaign), campaign, workers, dask, progress, say)
+
+
+def _go_on(
+    store: ResultStore,
+    campaign: Campaign,
+    workers: int | None,
+    dask: str | None,
+    progress: Progress | None,
+    say: Callable[[str], None],
+) -> tuple[pa.Table, Totals]:
+    for note in store.notes:
+        say(note)
     jobs = campaign.jobs()
     todo = [job for job in jobs if job.index not in store.done]
     count = workers or os.cpu_count() or 1
     worker = Worker(campaign)
     start_s = time.perf_counter()
-    results: Iterator[Done] = (
-        on_dask(worker, todo, dask) if dask else in_processes(worker, todo, count)
-    )
+    results: Iterator[Done]
+    native = ("sim_twin._pil",) if campaign.file.target == "pil" else ()
+    if dask:
+        results = on_dask(worker, todo, dask, _lost, say, (*PROGRAM, *native))
+    else:
+        if native:  # said once here; else each run would be refused for it
+            from sim_twin.pil import pil_is_missing  # noqa: PLC0415 - for this target only
+
+            if missing := pil_is_missing():
+                raise BadInput(missing)
+        results = in_processes(worker, todo, count, _lost)
     busy_s, flushed_s = 0.0, start_s
     try:
         for number, done in enumerate(results, start=1):

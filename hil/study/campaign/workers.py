@@ -1,56 +1,88 @@
-"""Who does the jobs of a campaign: processes of this machine, or a Dask cluster by its address.
+"""Who does the jobs of a campaign on this machine: worker processes.
 
-Both give results as they come, in any order, and outlive a worker that is killed: its jobs are
+They give results as they come, in any order, and outlive a worker that is killed: its jobs are
 given to another. A job is a small picklable value; the function is one of this package's.
 """
 
 from __future__ import annotations
 
-import importlib
-import itertools
 import multiprocessing
-import signal
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, as_completed, wait
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Self, TypeVar
 
-from hil.core.errors import BadInput, RigFault
+from hil.core.errors import RigFault
+from hil.study.workers import leave_ctrl_c_to_parent
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 # Jobs handed out ahead per worker: enough that none waits, few enough that little is redone.
-_AHEAD = 3
-_MOST_CRASHES = 5
-_CONNECT_S = 10
+AHEAD = 3
+# Deaths after which a job is tried by itself, and after which it is given up.
+_SUSPECT_DEATHS = 2
+_MOST_DEATHS = 5
+# Jobs given up without a result in between: then it is not the job.
+MOST_LOST = 3
 
 
 def in_processes(
-    function: Callable[[Job], Result], jobs: Iterable[Job], workers: int
+    function: Callable[[Job], Result],
+    jobs: Iterable[Job],
+    workers: int,
+    lost: Callable[[Job, str], Result] | None = None,
 ) -> Iterator[Result]:
-    """Yield the results of all jobs; raises RigFault when one job's worker dies again and again."""
-    todo = deque(jobs)
-    crashes: Counter[str] = Counter()
-    while todo:
-        pool = _workers(min(workers, len(todo)))
+    """Yield the results of all jobs.
+
+    A job whose worker dies again and again, in the end with no other job beside it, is given up:
+    `lost` makes its result of the job and the reason. Raises RigFault without `lost`, and when
+    several jobs in a row are lost.
+    """
+    todo, suspects = deque(jobs), deque[Job]()
+    deaths: Counter[str] = Counter()
+    lost_in_a_row = 0
+    while todo or suspects:
+        queue, most = (suspects, 1) if suspects else (todo, AHEAD * workers)
+        pool = _workers(min(workers, most, len(queue)))
         running: dict[Future[Result], Job] = {}
         try:
-            yield from _hand_out(pool, function, todo, running, _AHEAD * workers)
+            for result in _hand_out(pool, function, queue, running, most):
+                lost_in_a_row = 0
+                yield result
         except BrokenProcessPool:
             for future, job in running.items():
                 if future.done() and future.exception() is None:
                     yield future.result()
                     continue
-                crashes[repr(job)] += 1
-                if crashes[repr(job)] >= _MOST_CRASHES:
-                    raise RigFault(
-                        f"job {job}: its worker died {crashes[repr(job)]} times; out of memory?"
-                    ) from None
-                todo.appendleft(job)
+                deaths[repr(job)] += 1
+                if deaths[repr(job)] < _SUSPECT_DEATHS:
+                    todo.appendleft(job)
+                elif deaths[repr(job)] < _MOST_DEATHS:
+                    suspects.appendleft(job)
+                else:
+                    lost_in_a_row += 1
+                    yield _given_up(job, deaths[repr(job)], lost, lost_in_a_row)
+        except KeyboardInterrupt:
+            _end_workers()
+            raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _given_up(
+    job: Job, deaths: int, lost: Callable[[Job, str], Result] | None, lost_in_a_row: int
+) -> Result:
+    reason = f"its worker died {deaths} times; out of memory?"
+    if lost is None:
+        raise RigFault(f"job {job}: {reason}")
+    if lost_in_a_row >= MOST_LOST:
+        raise RigFault(
+            f"{lost_in_a_row} runs one after the other: {reason} Rows so far are kept, the same "
+            "command goes on; fewer --workers need less memory"
+        )
+    return lost(job, reason)
 
 
 def _hand_out(
@@ -77,65 +109,48 @@ class Pool:
 
     def __init__(self, function: Callable[[Job], Result], workers: int) -> None:
         self._function = function
+        self._count = workers
         self._pool = _workers(workers)
 
     def __enter__(self) -> Self:
         """Return the pool."""
         return self
 
-    def __exit__(self, *_exc: object) -> None:
+    def __exit__(self, kind: object, *_exc: object) -> None:
         """Give up what is not done and end the workers."""
+        if kind is not None:
+            _end_workers()
         self._pool.shutdown(wait=True, cancel_futures=True)
 
-    def map(self, jobs: Iterable[Job], done: Callable[[], None]) -> list[Any]:
-        """Return the results in the order of the jobs; `done` is called for each."""
-        results = []
-        try:
-            for result in self._pool.map(self._function, jobs):
-                results.append(result)
-                done()
-        except BrokenProcessPool:
-            raise RigFault(
-                "a worker process died; out of memory? fewer --workers need less"
-            ) from None
-        return results
+    def map(self, jobs: Sequence[Any], done: Callable[[int, Any], None]) -> list[Any]:
+        """Return the results in the order of the jobs; `done` gets each as it comes, with its place.
+
+        The jobs of a worker that is killed are done again; raises RigFault when that does not help.
+        """
+        results: dict[int, Any] = {}
+        for _ in range(_MOST_DEATHS):
+            places = [place for place in range(len(jobs)) if place not in results]
+            try:
+                futures = {self._pool.submit(self._function, jobs[i]): i for i in places}
+                for future in as_completed(futures):
+                    results[futures[future]] = future.result()
+                    done(futures[future], future.result())
+                return [results[place] for place in range(len(jobs))]
+            except BrokenProcessPool:
+                self._pool.shutdown(wait=True, cancel_futures=True)
+                self._pool = _workers(self._count)
+        raise RigFault(
+            f"worker processes died {_MOST_DEATHS} times; out of memory? fewer --workers need less. "
+            "What was found is kept, the same command goes on"
+        )
+
+
+def _end_workers() -> None:
+    """End this process's workers at once: their jobs leave nothing behind."""
+    for process in multiprocessing.active_children():
+        process.terminate()
 
 
 def _workers(count: int) -> ProcessPoolExecutor:
     context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(count, context, _leave_ctrl_c_to_parent)
-
-
-def _leave_ctrl_c_to_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def on_dask(
-    function: Callable[[Job], Result], jobs: Iterable[Job], address: str
-) -> Iterator[Result]:
-    """Yield the results of all jobs from the cluster whose scheduler is at `address`."""
-    try:
-        dask: Any = importlib.import_module("distributed")  # an optional package
-    except ImportError:
-        raise BadInput(
-            "--dask: the package distributed is missing; pip install 'skid-steer-hil[cluster]'"
-        ) from None
-    try:
-        client = dask.Client(address, timeout=_CONNECT_S)
-    except (OSError, ValueError, TimeoutError) as error:
-        raise BadInput(f"--dask {address}: no scheduler answers there ({error})") from None
-    with client:
-        source = iter(jobs)
-        most = _AHEAD * max(1, sum(client.nthreads().values()))
-
-        def submit(count: int) -> list[Any]:
-            # A job is not kept under a name made of its content: two campaigns may share jobs.
-            return [
-                client.submit(function, job, pure=False) for job in itertools.islice(source, count)
-            ]
-
-        waiting = dask.as_completed(submit(most))
-        for future in waiting:
-            yield future.result()
-            for more in submit(1):
-                waiting.add(more)
+    return ProcessPoolExecutor(count, context, leave_ctrl_c_to_parent)

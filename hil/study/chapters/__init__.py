@@ -1,0 +1,1 @@
+"""The other chapters: quadrotor and underwater vehicles under the laws of hil.control."""

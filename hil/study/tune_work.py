@@ -1,0 +1,240 @@
+"""What a search is about, and what it keeps on disk so that it can be stopped and gone on with.
+
+FILE.search beside the gain set FILE has one line per run that was made, as it came; the search is
+deterministic, so that the same command, given them back, goes on where it was stopped and ends with
+the same gain set. It is removed when the gain set is written.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import IO, Any, Self
+
+from hil.config.control import ControlConfig, PointReference
+from hil.config.deck import load_deck
+from hil.config.gains import Gains
+from hil.config.load import build, builtin_names, load_robot, load_scenario
+from hil.config.scenario import Scenario
+from hil.core.errors import BadInput
+from hil.study.tune import CASES, COST_WEIGHTS, SEARCH, Case, Figures, Plan, Trial, Variant
+from hil.study.tuning_verdict import ALL_SCENARIOS, HELD_OUT_SCENARIOS, JUDGED
+
+_FORMAT = "hil-tune-1"
+_KEPT = frozenset((*COST_WEIGHTS, *JUDGED))
+_VARIANTS: tuple[Variant, ...] = ("calm", "pushed", "late", "beside")
+
+
+@dataclass(frozen=True, slots=True)
+class Tasks:
+    """The scenarios that gains are searched and judged on; `own` where they are not the usual ones."""
+
+    scenarios: Mapping[str, Scenario]
+    own: bool
+    robot: str | None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the scenarios' names."""
+        return tuple(self.scenarios)
+
+    @property
+    def base(self) -> Gains:
+        """Return the gains that hold what is not searched."""
+        first = next(iter(self.scenarios.values()))
+        return first.control.active_gains if self.own else ControlConfig().active_gains
+
+    @property
+    def origin(self) -> dict[str, str]:
+        """Return what a gain set says of tasks of its own."""
+        if not self.own:
+            return {}
+        first = next(iter(self.scenarios.values()))
+        return {"robot": first.robot.name, "tasks_sha256": _digest(self.trees)}
+
+    @property
+    def trees(self) -> dict[str, Any]:
+        """Return every resolved value of the scenarios."""
+        return {name: task.model_dump(mode="json") for name, task in self.scenarios.items()}
+
+    def cases(self) -> tuple[Case, ...]:
+        """Return the runs of a candidate: the usual ones, or each task in all its variants.
+
+        A task whose reference is no point has no place beside it. The variants of a task go over
+        the two wheel laws in turn.
+        """
+        if self.names == HELD_OUT_SCENARIOS:
+            return CASES
+        found = []
+        for i, (name, task) in enumerate(self.scenarios.items()):
+            point = isinstance(task.reference, PointReference)
+            variants = _VARIANTS if point else _VARIANTS[:-1]
+            found += [
+                Case(name, variant, ("asg-ism", "pid")[(i + j) % 2])
+                for j, variant in enumerate(variants)
+            ]
+        return tuple(found)
+
+
+def load_tasks(names: Sequence[str], robot: str | None, overrides: Sequence[str] = ()) -> Tasks:
+    """Return the tasks of scenario names or files, or of one deck; the usual ones without any.
+
+    `robot` is a built-in robot or a file, which takes the place of each scenario's own. Raises
+    BadInput.
+    """
+    if len(names) == 1 and _is_deck(names[0]):
+        names = load_deck(names[0]).scenarios
+    own = bool(names or robot or overrides)
+    scenarios: dict[str, Scenario] = {}
+    for name in names or HELD_OUT_SCENARIOS:
+        task = load_scenario(name, overrides)
+        if robot is not None:
+            tree = task.model_dump(mode="json")
+            task = build(
+                Scenario, tree | {"robot": load_robot(robot).model_dump(mode="json")}, name
+            )
+        if task.name in scenarios or task.name == ALL_SCENARIOS:
+            raise BadInput(
+                f"{name}: its name = {task.name!r} is taken; give each scenario a name of its own"
+            )
+        scenarios[task.name] = task
+    return Tasks(scenarios, own, robot)
+
+
+def _is_deck(name: str) -> bool:
+    if name in builtin_names("decks"):
+        return True
+    with suppress(OSError, ValueError):
+        return "scenarios" in tomllib.loads(Path(name).read_text(encoding="utf-8"))
+    return False
+
+
+class Journal:
+    """The runs of a search on disk, by what they were runs of."""
+
+    def __init__(self, path: Path, identity: Mapping[str, Any]) -> None:
+        self.path = path
+        self.notes: list[str] = []
+        self._known: dict[str, Figures] = {}
+        fresh = not self._take_up(dict(identity))
+        self._file: IO[str] = path.open("w" if fresh else "a", encoding="utf-8")
+        if fresh:
+            self._write({"format": _FORMAT, "identity": dict(identity)})
+
+    def __enter__(self) -> Self:
+        """Return the journal."""
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        """Close it; what is in it stays."""
+        self._file.close()
+
+    def __len__(self) -> int:
+        """Return the runs that are there already."""
+        return len(self._known)
+
+    def _take_up(self, identity: dict[str, Any]) -> bool:
+        """Read what an interrupted search left; say whether there is one of the same identity."""
+        if not self.path.exists():
+            return False
+        lines = self.path.read_text(encoding="utf-8", errors="replace").splitlines()
+        trees = [_parsed(line) for line in lines]
+        head = trees[0] if trees else None
+        if head is None or head.get("format") != _FORMAT:
+            aside = self.path.replace(self.path.with_name(f"{self.path.name}.damaged"))
+            self.notes.append(f"{self.path}: damaged at its beginning; kept as {aside}, begun anew")
+            return False
+        for key, value in identity.items():
+            if head["identity"].get(key) != value:
+                raise BadInput(
+                    f"{self.path}: is what another search left (its {key} differs: "
+                    f"{_short(head['identity'].get(key))}, now {_short(value)}); give the command "
+                    "that began it, delete the file, or name another --out"
+                )
+        damaged = sum(tree is None for tree in trees[1:])
+        if damaged:
+            self.notes.append(f"{self.path}: {damaged} damaged lines; their runs are made again")
+        self._known = {tree["run"]: tree["figures"] for tree in trees[1:] if tree is not None}
+        if lines and not self.path.read_bytes().endswith(b"\n"):
+            with self.path.open("a", encoding="utf-8") as file:
+                file.write("\n")
+        return True
+
+    def make(
+        self,
+        trials: Sequence[Trial],
+        run: Callable[[Sequence[Trial], Callable[[int, Figures], None]], object],
+        done: Callable[[], None],
+    ) -> list[Figures]:
+        """Return the figures of each trial; `run` makes those that are not there yet.
+
+        `run` gets the trials to make and what to call with the place and figures of each; `done` is
+        called for every trial.
+        """
+        keys = [_key(trial) for trial in trials]
+        missing = [place for place, key in enumerate(keys) if key not in self._known]
+        for _ in range(len(trials) - len(missing)):
+            done()
+
+        def made(place: int, figures: Figures) -> None:
+            key = keys[missing[place]]
+            self._known[key] = {name: figures[name] for name in figures if name in _KEPT}
+            self._write({"run": key, "figures": self._known[key]})
+            done()
+
+        if missing:
+            run([trials[place] for place in missing], made)
+        return [self._known[key] for key in keys]
+
+    def _write(self, tree: Mapping[str, Any]) -> None:
+        text = json.dumps(tree)
+        self._file.write(f"{zlib.crc32(text.encode()):08x} {text}\n")
+        self._file.flush()
+
+    def remove(self) -> None:
+        """Remove it: the gain set is written."""
+        self._file.close()
+        self.path.unlink(missing_ok=True)
+
+
+def identity_of(tasks: Tasks, plan: Plan, camera: str, program: str) -> dict[str, Any]:
+    """Return what decides the runs of a search; a larger budget is the same search gone on with."""
+    searched = {"boxes": SEARCH, "cost": COST_WEIGHTS, "cases": [str(c) for c in plan.cases]}
+    return {
+        "camera": camera,
+        "seed": plan.search_seed,
+        "seeds": list(plan.seeds),
+        "population": plan.population,
+        "tasks": _digest(tasks.trees),
+        "gains kept": _digest(tasks.base.model_dump(mode="json")),
+        "procedure": _digest(searched),
+        "program": program,
+    }
+
+
+def _key(trial: Trial) -> str:
+    gains = trial.gains.model_dump(exclude={"origin"})
+    return _digest([trial.outer, gains, asdict(trial.case), trial.seed])[:24]
+
+
+def _digest(tree: object) -> str:
+    return hashlib.sha256(json.dumps(tree, sort_keys=True).encode()).hexdigest()
+
+
+def _parsed(line: str) -> dict[str, Any] | None:
+    """Return a whole line's content, None for a torn or damaged one."""
+    crc, _, text = line.partition(" ")
+    if crc != f"{zlib.crc32(text.encode()):08x}":
+        return None
+    tree: dict[str, Any] = json.loads(text)
+    return tree
+
+
+def _short(value: object) -> str:
+    return repr(value)[:60]
