@@ -109,7 +109,10 @@ class Kernel:
         zone: Zone,
     ) -> None:
         """Add a disturbance; times count from `begin`."""
-    def add_fault(self, kind: int, left: bool, right: bool, start_s: float, end_s: float) -> None:
+    def add_fault(
+        self, kind: int, left: bool, right: bool, start_s: float, end_s: float,
+        strength: float = 1.0,
+    ) -> None:  # fmt: skip
         """Add a fault; times count from `begin`, and one with start 0 is there before it too."""
     def set_outside(
         self,

@@ -72,6 +72,7 @@ def make_kernel(
                 fault.side != "left",
                 fault.start_s,
                 _end_s(fault.end_s),
+                fault.strength_ratio,
             )
     return kernel
 

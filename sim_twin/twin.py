@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from random import Random
 from typing import TYPE_CHECKING, Protocol
 
@@ -145,6 +145,7 @@ class Twin:
         self._now_s = HOST_START_S
         self._uplink: deque[tuple[float, bytes]] = deque()
         self._exposed: deque[tuple[Exposure, tuple[PoseTuple, ...]]] = deque()
+        self._last_frame: Frame | None = None
         self._set_spans(math.inf)
         self._next_frame = self._shutter.next(self._stalls)
         self._outside = self._open_outside(setup)
@@ -191,10 +192,17 @@ class Twin:
         if not self._exposed:
             return None
         exposure, poses = self._exposed.popleft()
-        if self._maker is None:
+        repeated = any(start_s <= exposure.start_s < end_s for start_s, end_s in self._repeats)
+        if repeated and self._last_frame is not None:
+            again = replace(self._last_frame, index=exposure.index, t_cam_s=exposure.t_cam_s)
+            self._last_frame = again
+        elif self._maker is None:
             measured = self._drawn.measure(poses[0] if poses else None)
-            return Frame(exposure.index, exposure.t_cam_s, None, measured)
-        return Frame(exposure.index, exposure.t_cam_s, self._maker.make(exposure.index, poses))
+            self._last_frame = Frame(exposure.index, exposure.t_cam_s, None, measured)
+        else:
+            image = self._maker.make(exposure.index, poses)
+            self._last_frame = Frame(exposure.index, exposure.t_cam_s, image)
+        return self._last_frame
 
     def truth(self) -> Truth:
         """Return the true state now."""
@@ -217,6 +225,7 @@ class Twin:
 
         self._stalls = spans("camera_stall")
         self._occlusions = spans("camera_occluded")
+        self._repeats = spans("camera_repeated")
         self._down.cuts = self._up.cuts = spans("link_cut")
 
     def _advance(self, target_s: float) -> bool:

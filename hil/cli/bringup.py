@@ -52,7 +52,7 @@ def command(
     if target in SIMULATED:
         raise BadInput(
             f"--on {target}: bringup needs a port; to try it on the twin, `hil twin serve --set "
-            "robot.variant=lifted`, then --on serial:/tmp/hil-twin"
+            "robot.variant=lifted`, then --on serial:PORT with the port that it names"
         )
     believed = load_robot(robot)
     device, baud = parse_target(target)

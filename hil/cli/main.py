@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import importlib
-import os
-import signal
 import sys
+import traceback
 from typing import NoReturn
 
 import click
 
 from hil import __version__
-from hil.core.errors import HilError
+from hil.cli.streams import let_readers_go
+from hil.core.errors import HilError, RigFault, stop_status
 from hil.core.text import visible
-from hil.runs.interruption import end_as_by_ctrl_c
-from hil.study.work_folder import Terminated
+from hil.runs.interruption import ignore_signals, last_stop, take_signals
 
 # name -> (module, one-line help). The text stands here so that `hil --help` imports no command.
 COMMANDS = {
@@ -41,6 +40,7 @@ COMMANDS = {
         "Reproduce the thesis's numerical studies, chapters 4 to 8; judge its claims.",
     ),
     "tune": ("hil.cli.tune", "Tune the gains of laws by one procedure and budget."),
+    "faults": ("hil.cli.faults", "Break everything once: each fault at each instant."),
     "twin": ("hil.cli.twin", "Serve the digital twin to other programs."),
     "firmware": ("hil.cli.firmware", "Generate, build, upload and configure the firmware."),
     "calibrate": ("hil.cli.calibrate", "Calibrate lens, camera pose over the floor, and colours."),
@@ -83,34 +83,62 @@ def cli() -> None:
 
     \b
     Exit status: 0 all requirements held, 1 a requirement failed, 2 bad usage or input,
-    3 rig fault (port, camera, board), 130 stopped by Ctrl-C (or SIGTERM, SIGHUP).
+    3 rig fault (port, camera, board), 130 stopped by Ctrl-C, 143 by SIGTERM,
+    129 by SIGHUP.
     """  # noqa: D301 - \b is click's mark for a verbatim paragraph
 
 
 def main() -> NoReturn:
-    """Run the command line; every expected error is one line on stderr and its exit status."""
-    end_as_by_ctrl_c()
+    """Run the command line; every expected end is one line on stderr and its exit status."""
+    let_readers_go()
+    take_signals()
+    status = _run()
+    ignore_signals()
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        status = _say(f"output cannot be written: {error.strerror}", RigFault.exit_status)
+    sys.exit(status)
+
+
+def _run() -> int:
+    """Run the command that was asked for and return the exit status."""
+    try:
+        return _run_command()
+    except Exception:
+        stopped = last_stop()
+        if stopped is not None:  # a library made something else of it
+            return _say(f"stopped by {stopped}", 128 + stopped.number)
+        traceback.print_exc()
+        return _say("an error of the program itself, see above", RigFault.exit_status)
+
+
+def _run_command() -> int:  # noqa: PLR0911 - one return for each kind of end
     try:
         status = cli.main(prog_name="hil", standalone_mode=False)
-        sys.exit(status if isinstance(status, int) else 0)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message(), err=True)
-        sys.exit(2)
+        return 2
     except click.ClickException as error:
-        click.echo(f"hil: {visible(' '.join(error.format_message().split()))}", err=True)
-        sys.exit(error.exit_code if isinstance(error, click.UsageError) else 2)
+        said = " ".join(error.format_message().split())
+        return _say(said, error.exit_code if isinstance(error, click.UsageError) else 2)
     except HilError as error:
-        click.echo(f"hil: {visible(str(error))}", err=True)
-        sys.exit(error.exit_status)
+        return _say(str(error), error.exit_status)
     except (click.Abort, KeyboardInterrupt) as error:
-        if isinstance(error.__cause__ or error, Terminated):
-            click.echo("hil: stopped by SIGTERM", err=True)
-            sys.exit(128 + signal.SIGTERM)
-        click.echo("hil: stopped by Ctrl-C", err=True)
-        sys.exit(130)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)
+        name = str(error.__cause__ or error) or "Ctrl-C"
+        return _say(f"stopped by {name}", stop_status(name))
+    except SystemExit as error:
+        return error.code if isinstance(error.code, int) else 0
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else "output cannot be written: "
+        return _say(f"{where}{error.strerror or error}", RigFault.exit_status)
+    return status if isinstance(status, int) else 0
+
+
+def _say(text: str, status: int) -> int:
+    """Write one line to stderr and return the status."""
+    click.echo(f"hil: {visible(text)}", err=True)
+    return status
 
 
 if __name__ == "__main__":

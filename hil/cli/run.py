@@ -144,6 +144,7 @@ def summary(record: RunRecord) -> dict[str, Any]:
             {"text": item.text(), "value": _finite(item.value), "holds": item.holds}
             for item in record.verdicts()
         ],
+        "diagnoses": record.diagnoses(),
         **record.figures().to_json(),
     }
 
@@ -169,6 +170,8 @@ def print_summary(record: RunRecord) -> None:
         console.print(Text.assemble("  ", mark, f"  {item.text()}   ({is_now})"))
     for note in manifest.notes:
         console.print(Text.assemble(("note:", "yellow"), f" {visible(note)}"))
+    for text in record.diagnoses():
+        console.print(Text.assemble(("diagnosis:", "yellow"), f" {visible(text)}"))
     console.print(f"record: {visible(str(record.path))}")
 
 

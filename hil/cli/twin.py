@@ -5,10 +5,15 @@ from __future__ import annotations
 import math
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from hil.cli.options import seed_option, set_option
+
+if TYPE_CHECKING:
+    from hil.core.rig import Rig as TwinRig
+    from hil.tools.serve_twin import TwinServer
 
 
 @click.group()
@@ -18,10 +23,11 @@ def command() -> None:
 
 @command.command()
 @click.argument("scenario", default="scenario-1")
-@click.option("--pty", type=click.Path(path_type=Path), default="/tmp/hil-twin", show_default=True,
-              help="Name of the pseudo-terminal that stands for the board's port.")  # fmt: skip
-@click.option("--frames", type=click.Path(path_type=Path), default="/tmp/hil-twin.sock",
-              show_default=True, help="Unix socket that gives the camera's frames.")  # fmt: skip
+@click.option("--pty", type=click.Path(path_type=Path), metavar="PATH",
+              help="Name of the pseudo-terminal that stands for the board's port.  "
+              "[default: in a folder of your own]")  # fmt: skip
+@click.option("--frames", type=click.Path(path_type=Path), metavar="PATH",
+              help="Unix socket that gives the camera's frames.  [default: beside the port]")  # fmt: skip
 @click.option("--camera", default="rendered", show_default=True, metavar="SOURCE",
               help="rendered or pose.")  # fmt: skip
 @click.option("--duration", "duration_s", type=click.FloatRange(0.1), metavar="SECONDS",
@@ -30,8 +36,8 @@ def command() -> None:
 @set_option
 def serve(
     scenario: str,
-    pty: Path,
-    frames: Path,
+    pty: Path | None,
+    frames: Path | None,
     camera: str,
     duration_s: float | None,
     seed: int,
@@ -42,19 +48,20 @@ def serve(
     Another program meets it as it would meet the board, for example
 
     \b
-    hil run scenario-1 --on serial:/tmp/hil-twin --camera twin:/tmp/hil-twin.sock
+    hil run scenario-1 --on serial:PORT --camera twin:SOCKET
+
+    with the names that it prints. A second twin takes names of its own.
 
     Timed disturbances and faults of the scenario count from each arming.
     """  # noqa: D301 - \b is click's mark for a verbatim paragraph
     # `hil --help` must not load the twin.
     from hil.config.load import load_scenario
     from hil.rigs.opening import open_rig
-    from hil.tools.serve_twin import TwinServer
 
     rig = open_rig("twin", load_scenario(scenario, overrides), camera, seed)
-    server = TwinServer(rig, pty, frames)
+    server, names = _serving(rig, pty, frames)
     try:
-        click.echo(f"board on {pty}, camera on {frames}; Ctrl-C ends it", err=True)
+        click.echo(f"board on {names[0]}, camera on {names[1]}; Ctrl-C ends it", err=True)
         server.run(time.monotonic() + (duration_s or math.inf))
     finally:
         server.close()
@@ -98,3 +105,26 @@ def samples(out: Path, duration_s: float, seed: int) -> None:
 
     lines = write_samples(out, CameraConfig(), duration_s, seed)
     click.echo("\n".join([*lines, f"written to {out}"]))
+
+
+def _serving(
+    rig: TwinRig, pty: Path | None, frames: Path | None
+) -> tuple[TwinServer, tuple[Path, Path]]:
+    """Return the server and its names: those given, else the first pair that nobody uses."""
+    from hil.core.errors import BadInput
+    from hil.tools.serve_folder import default_names
+    from hil.tools.serve_twin import TwinServer
+
+    if pty is not None and frames is not None:
+        return TwinServer(rig, pty, frames), (pty, frames)
+    refused: BadInput | None = None
+    for port, socket in default_names():
+        names = pty or port, frames or socket
+        try:
+            return TwinServer(rig, *names), names
+        except BadInput as error:
+            if "in use" not in str(error):
+                raise
+            refused = error
+    assert refused is not None
+    raise refused

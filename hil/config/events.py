@@ -52,12 +52,14 @@ FaultKind = Literal[
     "swapped_phases",  # A and B exchanged: counts run backward
     "motor_reversed",  # polarity of one side's motors
     "motor_stuck",  # one side's gears jam
+    "motor_weak",  # a share of the voltage reaches one side's motors: strength_ratio
     "motors_exchanged",  # leads of left and right motors
     "encoders_exchanged",  # plugs of left and right encoders
     "board_reset",  # board held in reset from start to end, then boots anew
     "link_cut",  # nothing passes either way
     "camera_stall",  # no frames
     "camera_occluded",  # robot hidden from the camera
+    "camera_repeated",  # frames keep coming with new stamps, each a copy of the last one
 ]
 SIDED = {
     "dead_encoder",
@@ -66,6 +68,7 @@ SIDED = {
     "swapped_phases",
     "motor_reversed",
     "motor_stuck",
+    "motor_weak",
 }
 
 
@@ -129,6 +132,9 @@ class Fault(Section):
     side: Literal["left", "right", "both"] = Field("both", description="of encoders and motors")
     start_s: float = quantity("s", "in force from then on; 0: from power-up", 0.0, ge=0, le=3600)
     end_s: float | None = quantity("s", "None: to the end of the run", None, gt=0, le=3600)
+    strength_ratio: float = quantity(
+        "(ratio)", "of motor_weak: what is left of its voltage", 0.4, gt=0, le=1
+    )
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:

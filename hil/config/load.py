@@ -20,7 +20,7 @@ from hil.config.own_settings import BY_NAME_KEY, PLACES, model_at, renew
 from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
-from hil.core.files import parse_toml
+from hil.core.files import parse_toml, read_text
 from hil.core.registry import is_file_name
 
 # Values that would be laid aside: the command's own option (in a campaign, its list) decides them.
@@ -203,7 +203,7 @@ def _read_text(name_or_path: str, kind: str) -> tuple[str, str, Path | None]:
         none = f" and no built-in {one}" if names else f"; give the path of a {one} file"
         raise BadInput(f"{one} {name_or_path!r}: no such file{none}{hint}")
     try:
-        return path.read_text(encoding="utf-8"), str(path), path.parent
+        return read_text(path), str(path), path.parent
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(f"{path}: cannot be read: {error}") from None
 

@@ -60,6 +60,19 @@ class Requirement(Section):
         return self
 
 
+Reaction = Literal["stop", "warn"]
+
+
+class ReactionsConfig(Section):
+    """What the host does about each fault that it finds implausible (hil.runs.plausibility)."""
+
+    motor_stuck: Reaction = Field("stop", description="a side creeps at high PWM")
+    encoder_intermittent: Reaction = Field("stop", description="counts of a side come and go")
+    frames_repeated: Reaction = Field("stop", description="the same picture again and again")
+    sides_swapped: Reaction = Field("stop", description="the wheels turn the other way round")
+    no_progress: Reaction = Field("stop", description="the goal does not come nearer")
+
+
 class SafetyConfig(Section):
     """When the host stops the robot by itself."""
 
@@ -69,6 +82,10 @@ class SafetyConfig(Section):
     fence_x_max_m: float = quantity("m", "geofence of the centre of mass, world X", 1.0)
     fence_y_min_m: float = quantity("m", "geofence of the centre of mass, world Y", -0.75)
     fence_y_max_m: float = quantity("m", "geofence of the centre of mass, world Y", 0.75)
+
+    reactions: ReactionsConfig = Field(
+        default_factory=ReactionsConfig, description="stop, or warn and go on, fault by fault"
+    )
 
     @model_validator(mode="after")
     def _fence_has_an_inside(self) -> Self:

@@ -1,4 +1,4 @@
-"""Files put in place whole, and TOML read with one line of what is wrong: the one place for both."""
+"""Files put in place whole, read with a bound on their size, and TOML with one line of what is wrong."""
 
 from __future__ import annotations
 
@@ -10,6 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from hil.core.errors import BadInput
+
+TEXT_BYTES = 4_000_000  # scenarios, robots, laws, mappings: the largest shipped one has 12 KB
+RECORD_BYTES = 64_000_000  # manifests, tables as text
+LOG_BYTES = 512_000_000  # logs: a day at the link's full rate
 
 
 def replace_file(path: Path, data: bytes, *, durable: bool = False) -> None:
@@ -48,7 +52,7 @@ def read_toml(path: Path, what: str = "") -> dict[str, Any]:
     """
     name = f"{what} {path}".strip()
     try:
-        return parse_toml(path.read_text(encoding="utf-8"), str(path))
+        return parse_toml(read_text(path), str(path))
     except OSError as error:
         raise BadInput(f"{name}: cannot be read: {error.strerror or error}") from None
     except UnicodeDecodeError as error:
@@ -61,3 +65,31 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # a number or brackets beyond what Python takes
         raise BadInput(f"{name}: not valid TOML: {error}") from None
+
+
+def read_bounded(path: Path, limit_bytes: int = TEXT_BYTES) -> bytes:
+    """Return a file's bytes; raises BadInput for a larger one (unread beyond the limit), OSError."""
+    with path.open("rb") as file:
+        data = file.read(limit_bytes + 1)
+    if len(data) > limit_bytes:
+        size = path.stat().st_size
+        raise BadInput(
+            f"{path}: {size} bytes; at most {limit_bytes} bytes are read of such a file; "
+            "is it the right one?"
+        )
+    return data
+
+
+def read_text(path: Path, limit_bytes: int = TEXT_BYTES, encoding: str = "utf-8") -> str:
+    """Return a text file with plain line ends; raises BadInput, OSError, UnicodeDecodeError."""
+    text = read_bounded(path, limit_bytes).decode(encoding)
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def check_size(path: Path, limit_bytes: int = LOG_BYTES) -> None:
+    """Raise BadInput for a file that is too large to be read as a whole; OSError when it is not there."""
+    size = path.stat().st_size
+    if size > limit_bytes:
+        raise BadInput(
+            f"{path}: {size} bytes; at most {limit_bytes} bytes are read of a log; cut it into parts"
+        )

@@ -23,6 +23,7 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 from hil.core.errors import BadInput
+from hil.core.files import read_text
 
 Thing = TypeVar("Thing", bound=Callable[..., Any])
 # name -> (least, start, largest) of what a search may vary, on a logarithmic scale
@@ -204,7 +205,7 @@ class Registry:
         path_text, _, wanted = _split_file_name(name)
         path = Path(path_text).resolve()
         try:
-            text = path.read_text(encoding="utf-8")
+            text = read_text(path)
         except (OSError, UnicodeDecodeError) as error:
             reason = getattr(error, "strerror", None) or str(error)
             raise BadInput(f"{self.kind} {name!r}: {path_text} cannot be read: {reason}") from None

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import cv2
 
-from hil.core.errors import RigFault
+from hil.core.errors import RecordFault
 from hil.record.reader import picture_name
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class CameraKeeper:
         self._writer: cv2.VideoWriter | None = None
         self._next_picture_s = float("-inf")
         self._newest: tuple[float, Image] | None = None
-        self._error = ""
+        self.error = ""
         self._queue: queue.Queue[tuple[float, Image, bool] | None] = queue.Queue(_QUEUE_FRAMES)
         self._thread = threading.Thread(target=self._work, name="camera-keeper", daemon=True)
         self._thread.start()
@@ -66,30 +66,35 @@ class CameraKeeper:
             self._queue.put((t_s, image, keep))
 
     def close(self) -> None:
-        """Encode what is waiting and the newest frame; raises RigFault when the video failed."""
+        """Encode what is waiting and the newest frame; raises RecordFault when the video failed."""
         if not self._thread.is_alive():
             return
         self._queue.put(None)
         self._thread.join()
         if self._newest is not None:
             self._keep(*self._newest)
-        if self._error:
-            raise RigFault(self._error)
+        if self.error:
+            raise RecordFault(self.error)
 
     def _work(self) -> None:
         while (item := self._queue.get()) is not None:
-            t_s, image, keep = item
-            if keep:
-                self._keep(t_s, image)
-            if self._video_path is not None and not self._error:
-                self._write_video(self._video_path, image)
+            try:
+                self._work_on(*item)
+            except cv2.error as error:  # the control loop must not wait for a thread that has died
+                self.error = self.error or f"pictures: {' '.join(str(error).split())}"
         if self._writer is not None:
             self._writer.release()
+
+    def _work_on(self, t_s: float, image: Image, keep: bool) -> None:
+        if keep:
+            self._keep(t_s, image)
+        if self._video_path is not None and not self.error:
+            self._write_video(self._video_path, image)
 
     def _keep(self, t_s: float, image: Image) -> None:
         path = self._folder / picture_name(t_s)
         if not cv2.imwrite(str(path), image, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]):
-            self._error = self._error or f"{path}: the picture cannot be written; disk full?"
+            self.error = self.error or f"{path}: the picture cannot be written; disk full?"
 
     def _write_video(self, path: Path, image: Image) -> None:
         if self._writer is None:
@@ -101,7 +106,7 @@ class CameraKeeper:
             size = (width, height)
             self._writer = cv2.VideoWriter(str(path), system, code, self._rate_hz, size)
             if not self._writer.isOpened():
-                self._error = f"{path}: the video cannot be written ({codec}); run without it"
+                self.error = f"{path}: the video cannot be written ({codec}); run without it"
                 return
             if small:
                 self._writer.set(cv2.VIDEOWRITER_PROP_QUALITY, _SMALL_QUALITY)

@@ -20,6 +20,7 @@ import pyarrow.parquet as pq
 from hil.core.errors import BadInput
 from hil.core.files import replacing
 from hil.record.schema import Column
+from hil.record.writing import GuardedFile, Keeping
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,9 +33,9 @@ _MAX_HEADER = 65_536
 class Journal:
     """Writer of one table; `write` only packs and buffers, `flush` hands rows to the system."""
 
-    def __init__(self, path: Path, names: Sequence[str]) -> None:
+    def __init__(self, path: Path, names: Sequence[str], keeping: Keeping) -> None:
         self.path = path
-        self._file = path.open("wb")
+        self._file = GuardedFile(path, keeping)
         self._pack = struct.Struct(f"<{len(names)}d").pack
         self._file.write(json.dumps({"format": _FORMAT, "columns": list(names)}).encode() + b"\n")
         self._file.flush()

@@ -24,7 +24,7 @@ from pydantic import (
 )
 
 from hil.core.errors import BadInput
-from hil.core.files import replace_file
+from hil.core.files import RECORD_BYTES, read_bounded, replace_file
 from hil.core.registry import Entry
 from hil.record import layout
 from hil.record.schema import SAMPLE_COLUMNS, SCHEMA_VERSION, Column
@@ -182,7 +182,7 @@ def read_manifest(folder: Path) -> Manifest:
     if not path.is_file():
         raise BadInput(f"{folder}: not a run record ({layout.MANIFEST} is missing)")
     try:
-        tree = json.loads(path.read_bytes())
+        tree = json.loads(read_bounded(path, RECORD_BYTES))
     except (OSError, ValueError) as error:
         raise BadInput(f"{path}: damaged, not readable as JSON: {error}") from None
     found = tree.get("schema_version") if isinstance(tree, Mapping) else None

@@ -63,6 +63,10 @@ class RunRecord:
         }
         return metrics.LinkStats(**known)
 
+    def diagnoses(self) -> list[str]:
+        """Return what the run found wrong with the robot and did not stop for."""
+        return [event.text for event in self.events if event.kind == "diagnosis"]
+
     def figures(self) -> metrics.Figures:
         """Return the figures, computed from the samples; all are NaN below two ticks."""
         if self.samples["t_s"].size < 2:

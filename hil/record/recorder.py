@@ -6,11 +6,12 @@ import dataclasses
 import json
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.analysis import metrics
-from hil.core.errors import BadInput
+from hil.core.errors import BadInput, RecordFault
 from hil.core.files import replace_file
 from hil.record import layout
 from hil.record.camera import CameraKeeper
@@ -20,6 +21,7 @@ from hil.record.reader import RunRecord, read_events, read_pictures
 from hil.record.schema import FRAME_COLUMNS, FRAME_NAMES, Column
 from hil.record.tape import TapeWriter
 from hil.record.tlog import TlogWriter
+from hil.record.writing import GuardedFile, Keeping
 
 if TYPE_CHECKING:
     import numpy as np
@@ -35,6 +37,8 @@ class Recorder:
     Times are host times in s since the start of the controlled part (negative before it). `append`
     takes one row of samples in the order of the manifest's sample_names and costs a few microseconds; rows,
     frames and events reach the system at least once per second of run time.
+
+    Once something cannot be written RecordFault is raised, and whatever follows is dropped.
     """
 
     def __init__(
@@ -51,21 +55,41 @@ class Recorder:
         self.path = out_dir
         self._manifest = manifest
         self._rerun = rerun
+        self._keeping = Keeping(out_dir)
         self._claim(out_dir)
-        self._keep(plugins)
-        self._samples = Journal(out_dir / layout.SAMPLES_JOURNAL, manifest.sample_names)
-        self._frames = Journal(out_dir / layout.FRAMES_JOURNAL, FRAME_NAMES)
-        self._tlog = TlogWriter(out_dir / layout.LINK, manifest.start_unix_us)
-        self.tape = TapeWriter(out_dir / layout.TAPE)
-        self._events = (out_dir / layout.EVENTS).open("w", encoding="utf-8")
+        try:
+            self._keeping.reserve()
+            self._open(plugins)
+        except OSError as error:
+            raise self._keeping.fail(error) from None
         self._camera: CameraKeeper | None = None
         kept = layout.CAMERA_SMALL if small_video else layout.CAMERA
         self._video = out_dir / kept if record_camera or small_video else None
         self._frame_rate_hz = frame_rate_hz
         self._next_flush_s = -math.inf
+        self._rows = 0
         self._write_row = self._samples.write
         self.link_frame = self._tlog.write
-        write_manifest(out_dir, manifest)
+        self._put_manifest()
+
+    def _open(self, plugins: Sequence[Plugin]) -> None:
+        out_dir, keeping = self.path, self._keeping
+        self._keep(plugins)
+        self._samples = Journal(
+            out_dir / layout.SAMPLES_JOURNAL, self._manifest.sample_names, keeping
+        )
+        self._frames = Journal(out_dir / layout.FRAMES_JOURNAL, FRAME_NAMES, keeping)
+        self._tlog = TlogWriter(out_dir / layout.LINK, self._manifest.start_unix_us, keeping)
+        self.tape = TapeWriter(out_dir / layout.TAPE, keeping)
+        self._events = GuardedFile(out_dir / layout.EVENTS, keeping)
+
+    def _put_manifest(self) -> None:
+        if self._keeping.fault is not None:
+            return
+        try:
+            write_manifest(self.path, self._manifest)
+        except OSError as error:
+            raise self._keeping.fail(error, self.path / layout.MANIFEST) from None
 
     @staticmethod
     def _claim(out_dir: Path) -> None:
@@ -89,11 +113,12 @@ class Recorder:
         """Take the wall time of t_s = 0, which dates every frame of link.tlog."""
         self._tlog.start_unix_us = unix_us
         self._manifest = self._manifest.model_copy(update={"start_unix_us": unix_us})
-        write_manifest(self.path, self._manifest)
+        self._put_manifest()
 
     def append(self, row: Sequence[float]) -> None:
         """Append one outer tick, values in the order of the manifest's sample_names, NaN for unknown."""
         self._write_row(row)
+        self._rows += 1
         if row[0] >= self._next_flush_s:
             self._next_flush_s = row[0] + _FLUSH_PERIOD_S
             self.flush()
@@ -104,10 +129,15 @@ class Recorder:
         The image (H, W, 3) uint8 BGR must not be changed afterwards: it is encoded later.
         """
         self._frames.write(row)
-        if image is not None:
+        if image is not None and self._keeping.fault is None:
             if self._camera is None:
-                self._camera = self._open_camera()
+                try:
+                    self._camera = self._open_camera()
+                except OSError as error:
+                    raise self._keeping.fail(error) from None
             self._camera.take(row[0], image)
+            if self._camera.error and self._keeping.fault is None:
+                raise self._keeping.fail(OSError(self._camera.error))
 
     def _open_camera(self) -> CameraKeeper:
         folder = self.path / layout.PICTURES
@@ -116,7 +146,7 @@ class Recorder:
     def event(self, t_s: float, kind: str, text: str) -> None:
         """Append one line of what happened: arming, stop, fault, disturbance, board's text."""
         line = json.dumps({"t_s": t_s, "kind": kind, "text": text}, ensure_ascii=False)
-        self._events.write(line + "\n")
+        self._events.write(line.encode(errors="replace") + b"\n")
 
     def identify(self, dialect_hash: str, parameter_hash: str, firmware_build_id: str) -> None:
         """Put into the manifest who the board said it is."""
@@ -127,10 +157,11 @@ class Recorder:
                 "firmware_build_id": firmware_build_id,
             }
         )
-        write_manifest(self.path, self._manifest)
+        self._put_manifest()
 
     def flush(self) -> None:
         """Hand everything so far to the system."""
+        self._keeping.check(self.path / layout.MANIFEST)
         self._samples.flush()
         self._frames.flush()
         self._tlog.flush()
@@ -140,8 +171,45 @@ class Recorder:
     def close(
         self, outcome: Outcome, detail: str = "", link: metrics.LinkStats | None = None
     ) -> RunRecord:
-        """Finish the record: tables, pictures, figures, Rerun file, and the manifest last."""
-        self._stop_writers()
+        """Finish the record: tables, pictures, figures, Rerun file, and the manifest last.
+
+        Where that cannot be done, what is there is left readable, the outcome becomes a fault, and
+        RecordFault is raised; so it is when something could not be written before.
+        """
+        try:
+            self._keeping.check(self.path / layout.MANIFEST)
+            self._stop_writers()
+            if self._keeping.fault is None:
+                return self._finish(outcome, detail, link)
+        except OSError as error:
+            self._keeping.fail(error)
+        except RecordFault:
+            pass
+        except Exception as error:
+            self._give_up(f"the record could not be finished: {error}")
+            raise
+        assert self._keeping.fault is not None
+        before = (
+            f"{detail}; "
+            if outcome != "complete" and detail not in str(self._keeping.fault)
+            else ""
+        )
+        self._give_up(f"{before}{self._keeping.fault}")
+        raise self._keeping.fault
+
+    def _give_up(self, detail: str) -> None:
+        """Leave what was written as it is, and say in the manifest how it ended, where that goes."""
+        with suppress(OSError, RecordFault):
+            self._stop_writers()
+        with suppress(OSError):
+            for part in self.path.rglob("*.part"):
+                part.unlink()
+        self._keeping.release()
+        ended = {"outcome": "fault", "outcome_detail": detail, "tick_count": self._rows}
+        with suppress(OSError):
+            write_manifest(self.path, self._manifest.model_copy(update=ended), durable=True)
+
+    def _finish(self, outcome: Outcome, detail: str, link: metrics.LinkStats | None) -> RunRecord:
         columns = self._manifest.sample_columns
         samples = self._finish_table(layout.SAMPLES_JOURNAL, layout.SAMPLES, columns)
         frames = self._finish_table(layout.FRAMES_JOURNAL, layout.FRAMES, FRAME_COLUMNS)
@@ -187,6 +255,7 @@ class Recorder:
 
     def _seal(self, run: RunRecord) -> RunRecord:
         """Write the final manifest with size and SHA-256 of every file."""
+        self._keeping.release()
         files = {
             file.relative_to(self.path).as_posix(): file_entry(file)
             for file in sorted(self.path.rglob("*"))

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 from hil.core.errors import BadInput, RigFault
 from hil.core.rig import PORT_BYTES, PortStream, discard_unsent
+from hil.record.writing import GuardedFile, Keeping
 
 if TYPE_CHECKING:
     from hil.core.rig import ByteStream, Frame, Rig, Truth
@@ -40,8 +41,8 @@ Entry = tuple[bytes, float | bytes]
 class TapeWriter:
     """Appends entries; `write` takes them packed."""
 
-    def __init__(self, path: Path) -> None:
-        self._file = path.open("wb")
+    def __init__(self, path: Path, keeping: Keeping) -> None:
+        self._file = GuardedFile(path, keeping)
         self.write: Callable[[bytes], int] = self._file.write
         self.write(_HEADER)
 

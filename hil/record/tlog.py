@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hil.core.errors import BadInput
+from hil.core.files import LOG_BYTES, read_bounded
+from hil.record.writing import GuardedFile, Keeping
 
 _STAMP = struct.Struct(">Q")
 _MAGIC_2 = 0xFD
@@ -30,8 +32,8 @@ class LoggedFrame(NamedTuple):
 class TlogWriter:
     """Writes whole MAVLink frames of both directions in the order in which they are given."""
 
-    def __init__(self, path: Path, start_unix_us: int) -> None:
-        self._file = path.open("wb")
+    def __init__(self, path: Path, start_unix_us: int, keeping: Keeping) -> None:
+        self._file = GuardedFile(path, keeping)
         self.start_unix_us = start_unix_us
 
     def write(self, t_s: float, frame: bytes) -> None:
@@ -50,7 +52,7 @@ class TlogWriter:
 
 def read_tlog(path: Path) -> Iterator[LoggedFrame]:
     """Yield every whole frame of a MAVLink 2 log; a torn last frame ends the iteration."""
-    data = path.read_bytes()
+    data = read_bounded(path, LOG_BYTES)
     at = 0
     while at + 8 + _HEADER_2 <= len(data):
         (stamp,) = _STAMP.unpack_from(data, at)

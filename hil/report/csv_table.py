@@ -12,11 +12,22 @@ from typing import TYPE_CHECKING
 from hil.core.errors import BadInput
 from hil.core.figures import METRICS
 from hil.core.files import replace_file
+from hil.core.text import visible
 
 if TYPE_CHECKING:
     from hil.record.reader import RunRecord
 
+# What begins a formula for some spreadsheet.
+_FORMULA = ("=", "+", "-", "@")
 _ABOUT = ("scenario_name", "target", "camera", "outer", "inner", "seed", "outcome")
+
+
+def _cell(value: object) -> object:
+    """Return text as a spreadsheet shows it: no control characters, and no formula that it would run."""
+    if not isinstance(value, str):
+        return value
+    text = visible(value)
+    return f"'{text}" if text.startswith(_FORMULA) else text
 
 
 def write_csv(path: Path, runs: Sequence[RunRecord]) -> None:
@@ -27,9 +38,9 @@ def write_csv(path: Path, runs: Sequence[RunRecord]) -> None:
     for run in runs:
         figures = run.figures()
         values = [figures.values[metric.name] for metric in METRICS]
-        about = [getattr(run.manifest, name) for name in _ABOUT]
+        about = [_cell(getattr(run.manifest, name)) for name in _ABOUT]
         numbers = [repr(value) if math.isfinite(value) else "" for value in values]
-        writer.writerow([run.path, *about, figures.basis, *numbers])
+        writer.writerow([_cell(str(run.path)), *about, figures.basis, *numbers])
     try:
         replace_file(path, out.getvalue().encode())
     except OSError as error:

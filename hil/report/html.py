@@ -16,6 +16,7 @@ from markupsafe import Markup
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME, METRICS
 from hil.core.files import replace_file
+from hil.core.text import visible
 from hil.report import figures as draw
 from hil.report.assumptions import Assumption, assumptions, gain_assumptions
 from hil.report.compare import HEADLINES, Comparison, Entry, best_entry, findings
@@ -71,8 +72,9 @@ def render(
     """Return the report as HTML text."""
     template = (files("hil.report") / "report.html.j2").read_text(encoding="utf-8")
     environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+        finalize=_shown,
+    )  # fmt: skip
     context = {
         "title": title or _title(comparisons),
         "subtitle": _subtitle(comparisons, repeats),
@@ -89,6 +91,13 @@ def render(
         "records": [_record(entry) for item in comparisons for entry in item.entries],
     }
     return environment.from_string(template).render(context)
+
+
+def _shown(value: object) -> object:
+    """Return text with its control characters made visible; markup of the report itself as it is."""
+    if not isinstance(value, str) or hasattr(value, "__html__"):
+        return value
+    return "\n".join(visible(line) for line in value.split("\n"))
 
 
 def _entries(comparisons: Sequence[Comparison]) -> list[Entry]:

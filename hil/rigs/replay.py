@@ -118,7 +118,7 @@ class ReplayRig:
         text: bytes = self._take()
         if kind == tape.FAULT:
             raise RigFault(text[1:].decode(errors="replace"))
-        raise KeyboardInterrupt
+        raise KeyboardInterrupt(text[1:].decode(errors="replace"))
 
     def _end(self) -> NoReturn:
         self.ended = True

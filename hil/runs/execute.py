@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,8 +23,9 @@ from hil.control.references import make_reference
 from hil.control.task_notes import notes
 from hil.control.vehicles.vehicle import make_vehicle
 from hil.core.clocks import CameraClock
+from hil.core.errors import stop_status
 from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES, VEHICLES
-from hil.core.registry import BUILT_IN, Entry, SourceText
+from hil.core.registry import BUILT_IN, Entry, SourceText, in_one_line
 from hil.record.manifest import Manifest, Plugin, TraceTerm, collect_versions, git_revision
 from hil.record.memory import MemoryRecorder
 from hil.record.recorder import Recorder
@@ -34,7 +35,8 @@ from hil.record.timeline import Timeline
 from hil.rigs.opening import REPLAY, SIMULATED, open_rig
 from hil.runs.interruption import CtrlC
 from hil.runs.law_guard import GuardedLaw
-from hil.runs.session import Parts, Progress, Publish, Session
+from hil.runs.outside import fault_of
+from hil.runs.session import Ending, Parts, Progress, Publish, Session
 from hil.wire.identity import board_hashes
 from hil.wire.link import BoardLink
 from vision.localisers.making import make_localiser
@@ -69,10 +71,10 @@ class RunSpec:
 
 
 def exit_status(record: RunRecord) -> int:
-    """Return the exit status of a run: 0 held, 1 a requirement failed, 3 rig fault, 130 Ctrl-C."""
+    """Return the exit status of a run: 0 held, 1 a requirement failed, 3 rig fault, 128 + signal."""
     outcome = record.manifest.outcome
     if outcome != "complete":
-        return 130 if outcome == "interrupted" else 3
+        return stop_status(record.manifest.outcome_detail) if outcome == "interrupted" else 3
     return 0 if all(verdict.holds for verdict in record.verdicts()) else 1
 
 
@@ -111,6 +113,10 @@ def execute(
 ) -> RunRecord:
     """Run the spec and return its closed record; raises BadInput before anything is written.
 
+    A record that cannot be written raises RecordFault, a signal that comes while it is closed Stopped
+    (the record is whole then), and an error of the harness itself is raised once robot and record
+    are left in good order.
+
     `rig` is another one than the spec's target names; it is closed here. `publish` is given the
     estimate of every tick.
     """
@@ -119,26 +125,49 @@ def execute(
     parameters = board_parameters(spec.scenario, spec.inner)
     law = make_law(spec)
     rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
+    manifest = make_manifest(spec)
+    ctrl_c = CtrlC()
     try:
-        recorder = Recorder(
-            spec.out,
-            make_manifest(spec),
-            plugins=plugins_of(spec),
-            record_camera=spec.record_camera,
-            small_video=spec.small_video,
-            frame_rate_hz=spec.scenario.camera.rate_hz,
-            rerun=spec.rerun,
-        )
-        ctrl_c = CtrlC()
-        parts = make_parts(spec, TapedRig(rig, recorder.tape, ctrl_c.obey), recorder, law)
-        session = Session(spec.scenario, parts, parameters, board_hashes, progress, publish)
         with ctrl_c:
-            ending = session.run()
-        record = recorder.close(ending.outcome, ending.detail, link_stats(parts.link))
+            recorder = Recorder(
+                spec.out,
+                manifest,
+                plugins=plugins_of(spec),
+                record_camera=spec.record_camera,
+                small_video=spec.small_video,
+                frame_rate_hz=spec.scenario.camera.rate_hz,
+                rerun=spec.rerun,
+            )
+            try:
+                parts = make_parts(spec, TapedRig(rig, recorder.tape, ctrl_c.obey), recorder, law)
+                session = Session(
+                    spec.scenario, parts, parameters, board_hashes, progress, publish
+                )  # fmt: skip
+            except Exception as error:
+                ctrl_c.close()
+                recorder.close("fault", in_one_line(error))
+                raise fault_of(error, used_things(spec)) or error from None
+            ending = _conduct(session, ctrl_c, used_things(spec))
+            record = recorder.close(ending.outcome, ending.detail, link_stats(parts.link))
+        if session.error is not None and fault_of(session.error, used_things(spec)) is None:
+            raise session.error
         ctrl_c.obey()  # pressed after the last wait: this run is whole, whatever follows is not begun
         return record
     finally:
         rig.close()
+
+
+def _conduct(session: Session, ctrl_c: CtrlC, used: Sequence[tuple[str, Entry]]) -> Ending:
+    """Run the session to its end, whatever that is; from then on signals wait for the record."""
+    try:
+        ending = session.run()
+    except KeyboardInterrupt as again:  # while the robot was being stopped
+        ctrl_c.close()
+        session.halt()
+        return Ending("interrupted", str(again))
+    ctrl_c.close()
+    fault = fault_of(session.error, used) if session.error is not None else None
+    return Ending("fault", str(fault)) if fault is not None else ending
 
 
 def execute_in_memory(
@@ -156,7 +185,10 @@ def execute_in_memory(
     try:
         recorder = MemoryRecorder(make_manifest(spec))
         parts = make_parts(spec, rig, recorder, law)
-        ending = Session(spec.scenario, parts, parameters, board_hashes).run()
+        session = Session(spec.scenario, parts, parameters, board_hashes)
+        ending = session.run()
+        if session.error is not None:
+            raise fault_of(session.error, used_things(spec)) or session.error
         return recorder.close(ending.outcome, ending.detail, link_stats(parts.link))
     finally:
         rig.close()
@@ -188,6 +220,13 @@ def make_law(spec: RunSpec) -> OuterLaw:
 
 def plugins_of(spec: RunSpec) -> list[Plugin]:
     """Return what ran that is not part of the harness, for the record."""
+    used = used_things(spec)
+    found = [Plugin.of(kind, entry) for kind, entry in used if entry.origin != BUILT_IN]
+    return found + _plant_of(spec)
+
+
+def used_things(spec: RunSpec) -> list[tuple[str, Entry]]:
+    """Return what the registries gave for a run, each with its kind."""
     control = spec.scenario.control
     used = (
         (OUTER_LAWS, spec.outer),
@@ -196,9 +235,7 @@ def plugins_of(spec: RunSpec) -> list[Plugin]:
         (REFERENCES, spec.scenario.reference.kind),
         (VEHICLES, spec.scenario.robot.vehicle.kind),
     )
-    entries = [(registry.kind, registry.get(name)) for registry, name in used]
-    found = [Plugin.of(kind, entry) for kind, entry in entries if entry.origin != BUILT_IN]
-    return found + _plant_of(spec)
+    return [(registry.kind, registry.get(name)) for registry, name in used]
 
 
 def _plant_of(spec: RunSpec) -> list[Plugin]:

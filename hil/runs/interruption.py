@@ -1,43 +1,87 @@
-"""Ctrl-C during a run: obeyed at the rig's next wait, so that it falls on a known instant.
+"""Every end that is asked for from outside: Ctrl-C, SIGTERM (a time-out, `kill`), SIGHUP (a lost terminal).
 
-Python raises KeyboardInterrupt wherever the program happens to be; a replay could not stop there
-again. A session waits at least once a tick, so the stop of the robot begins within one (1/30 s, or
-what a late host needs for it). Ctrl-C once more, before that, is KeyboardInterrupt at once.
+A run obeys at the rig's next wait, so that the end falls on a known instant: Python raises
+KeyboardInterrupt wherever the program happens to be, and a replay could not stop there again. A
+session waits at least once a tick, so the stop of the robot begins within one (1/30 s, or what a
+late host needs for it). A second signal before that is obeyed at once. While the record is being
+closed signals are noted and nothing more: closing is finished first.
 
-A plain `kill` (SIGTERM) and a terminal that is closed (SIGHUP) are taken as Ctrl-C is.
+Outside of runs a signal is `hil.core.errors.Stopped`, raised at once. Ignored signals (nohup, a job
+in the background) stay ignored.
 """
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 from types import FrameType
-from typing import Any, Self
+from typing import Any, NoReturn, Self
+
+from hil.core.errors import Stopped
 
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # Windows has no SIGHUP
 SIGNALS = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, name))
 
 
-def end_as_by_ctrl_c() -> None:
-    """Let SIGTERM and SIGHUP raise KeyboardInterrupt; one that is ignored (nohup) stays so."""
+class _Last:
+    """The signal that came last in this process, for those who see only what it turned into."""
+
+    stopped: Stopped | None = None
+
+
+def last_stop() -> Stopped | None:
+    """Return the signal that came last, None when none came."""
+    return _Last.stopped
+
+
+def take_signals() -> None:
+    """Let the signals raise Stopped in the main thread; one that is ignored stays so."""
+    _handle(_stop)
+
+
+def ignore_signals() -> None:
+    """Ignore the signals to the end: the work is done, and its status known."""
+    _handle(signal.SIG_IGN)
+
+
+def _handle(handler: Any) -> None:
     for number in SIGNALS:
-        if signal.getsignal(number) is signal.SIG_DFL:
-            signal.signal(number, _interrupt)
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, handler)
 
 
-def _interrupt(_number: int, _frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
+def _noted(number: int) -> Stopped:
+    _Last.stopped = Stopped(number)
+    return _Last.stopped
+
+
+def _stop(number: int, frame: FrameType | None) -> NoReturn:
+    stopped = _noted(number)
+    if _imports(frame):  # nothing is begun, and compiled modules do not survive an exception there
+        os.write(2, f"hil: stopped by {stopped}\n".encode())
+        os._exit(128 + number)
+    raise stopped
+
+
+def _imports(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False
 
 
 class CtrlC:
-    """Takes Ctrl-C while it is entered; in a thread that is not the main one it does nothing."""
+    """Keeps the signals for `obey` while entered; in a thread that is not the main one it does nothing."""
 
     def __init__(self) -> None:
-        self._asked: set[int] = set()
+        self._asked: Stopped | None = None
+        self._closing = False
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> Self:
-        """Begin to take Ctrl-C, SIGTERM and SIGHUP, as far as they are not ignored."""
+        """Begin to take the signals, as far as they are not ignored."""
         if threading.current_thread() is threading.main_thread():
             for number in SIGNALS:
                 if signal.getsignal(number) is not signal.SIG_IGN:
@@ -51,12 +95,17 @@ class CtrlC:
         self._before.clear()
 
     def _ask(self, number: int, _frame: FrameType | None) -> None:
-        if number in self._asked:  # SIGTERM and SIGHUP may well come together
-            raise KeyboardInterrupt
-        self._asked.add(number)
+        again = self._asked is not None and self._asked.number == number
+        if again and not self._closing:  # SIGTERM and SIGHUP may well come together
+            raise _noted(number)
+        self._asked = self._asked or _noted(number)
+
+    def close(self) -> None:
+        """From now on only note the signals: the record is being closed."""
+        self._closing = True
 
     def obey(self) -> None:
-        """Raise KeyboardInterrupt if Ctrl-C was pressed; once for each time."""
-        if self._asked:
-            self._asked.clear()
-            raise KeyboardInterrupt
+        """Raise Stopped if a signal came; once for each time."""
+        if self._asked is not None:
+            stopped, self._asked = self._asked, None
+            raise stopped

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from hil.core.errors import RigFault
+from hil.core.errors import RecordFault, RigFault
+from hil.core.registry import in_one_line
 from hil.core.types import PoseMeasurement
 from hil.record.tick_rows import sample_row
+from hil.runs.plausibility import Plausibility
 from hil.runs.supervision import Supervisor
 from hil.wire import handshake
 from hil.wire.refusal import refused_set_point
@@ -107,12 +110,14 @@ class Session:
         self._report: WheelReport | None = None
         self._measurement: PoseMeasurement | None = None
         self._supervisor = Supervisor(scenario.safety, parts.estimator)
+        self._plausibility = Plausibility(scenario.safety.reactions, self._note)
         self._pose_time_s = -math.inf  # of the newest pose believed
         self._seen = self._accepted = False  # since the last tick
         self._camera_restarts = 0
         self._camera_latency_s = math.nan
         self._poses = 0
         self._uplink_s = scenario.link.latency_s
+        self.error: Exception | SystemExit | None = None  # what ended the run and is no rig fault
 
     def run(self) -> Ending:
         """Run all phases; the robot is stopped whatever happens."""
@@ -134,12 +139,26 @@ class Session:
         except RigFault as fault:
             self.ending = Ending("fault", str(fault))
         except (KeyboardInterrupt, GeneratorExit) as stop:
-            by = "Ctrl-C" if isinstance(stop, KeyboardInterrupt) else "closed before its end"
-            self.ending = Ending("interrupted", by)
+            by = str(stop) or "Ctrl-C"
+            self.ending = Ending(
+                "interrupted",
+                by if isinstance(stop, KeyboardInterrupt) else "closed before its end",
+            )
+        except (Exception, SystemExit) as error:
+            self.error = error
+            self.ending = Ending("fault", in_one_line(error))
         finally:
             self._stop()
-        self._note(self.ending.outcome, self.ending.detail)
-        self._parts.timeline.start(self._parts.rig.now_s())
+        with suppress(RecordFault):  # closing the record says so
+            self._plausibility.finish()
+            self._note(self.ending.outcome, self.ending.detail)
+            self._parts.timeline.start(self._parts.rig.now_s())
+
+    def halt(self) -> None:
+        """Send the emergency stop at once and wait for nothing."""
+        if self._may_move:
+            with suppress(Exception):
+                self._parts.link.stop_now(self._parts.rig.now_s())
 
     # -- phases --------------------------------------------------------------------------------
 
@@ -202,9 +221,7 @@ class Session:
             due_s = self._t0_s + tick * period_s
             self._pump_until(due_s)
             now_s = rig.now_s()
-            if self._refusal:
-                raise RigFault(f"board: {self._refusal}")
-            self._supervisor.check(now_s, self._parts.link, self._report)
+            self._check_safety(now_s)
             estimate = self._estimate(now_s + self._uplink_s)
             reference = self._parts.reference.at(estimate.t_host_s - self._t0_s)
             yield Situation(now_s - self._t0_s, reference, estimate)
@@ -212,6 +229,8 @@ class Session:
                 law.reset(reference, estimate)
             command = law.step(reference, estimate, period_s)
             wheels = self._command_wheels(now_s, command)
+            self._plausibility.asked(*wheels)
+            self._plausibility.check_progress(now_s, math.dist(reference.z1_m, estimate.z1_m))
             self._record(now_s, command, wheels, now_s - due_s > _LATE_RATIO * period_s)
             if self._publish is not None:
                 self._publish(now_s, estimate, self._parts.link.armed)
@@ -232,8 +251,11 @@ class Session:
             reason = "no answer to the stop; the board's own time-out ends its motion"
         except (RigFault, KeyboardInterrupt) as error:
             reason = str(error) or "Ctrl-C"
+        except Exception as error:
+            self.error, reason = self.error or error, in_one_line(error)
         link.stop_now(rig.now_s())
-        self._note("stop", f"emergency stop sent: {reason}")
+        with suppress(RecordFault):
+            self._note("stop", f"emergency stop sent: {reason}")
 
     # -- events --------------------------------------------------------------------------------
 
@@ -316,8 +338,18 @@ class Session:
             if parts.estimator.on_pose(exposure_s, measurement):
                 self._pose_time_s = exposure_s
                 self._accepted = True
+        self._plausibility.saw(frame, self._report, parts.vehicle.geometry.rad_per_count)
         self._supervisor.saw(exposure_s, measurement)
         parts.timeline.camera_frame(frame, now_s, exposure_s, measurement)
+
+    def _check_safety(self, now_s: float) -> None:
+        """Raise RigFault when the host itself must stop the robot."""
+        if self._refusal:
+            raise RigFault(f"board: {self._refusal}")
+        link = self._parts.link
+        self._supervisor.check(now_s, link, self._report)
+        if self._report is not None:
+            self._plausibility.check(now_s, self._report, link.info.pwm_top_counts)
 
     def _measured(self, frame: Frame, exposure_s: float) -> PoseMeasurement:
         """Return the frame's own pose, else what the localiser finds near the estimate."""

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import FrameType
 from typing import IO, Any
 
-from hil.core.errors import BadInput
+from hil.core.errors import BadInput, Stopped
 
 LOCK, SET_ASIDE = ".lock", "set-aside"
 _INTERRUPTED_AGAIN = 3
@@ -42,8 +42,11 @@ def set_aside(path: Path, folder: Path) -> Path:
     return target
 
 
-class Terminated(KeyboardInterrupt):
+class Terminated(Stopped):
     """SIGTERM came; caught wherever Ctrl-C is, so that both leave the same behind."""
+
+    def __init__(self) -> None:
+        super().__init__(signal.SIGTERM)
 
 
 @contextmanager

@@ -188,10 +188,11 @@ void bind_kernel(nb::module_& m) {
            "load"_a, "shape"_a, "amplitude"_a, "start_s"_a, "end_s"_a, "frequency_hz"_a,
            "phase_rad"_a, "seed"_a, "zone"_a)
       .def("add_fault",
-           [](Kernel& k, int kind, bool left, bool right, double start_s, double end_s) {
-             k.add_fault({static_cast<twin::FaultKind>(kind), left, right, start_s, end_s});
+           [](Kernel& k, int kind, bool left, bool right, double start_s, double end_s,
+              double strength) {
+             k.add_fault({static_cast<twin::FaultKind>(kind), left, right, start_s, end_s, strength});
            },
-           "kind"_a, "left"_a, "right"_a, "start_s"_a, "end_s"_a)
+           "kind"_a, "left"_a, "right"_a, "start_s"_a, "end_s"_a, "strength"_a = 1.0)
       .def("set_outside", &set_outside, "outside"_a, "period_us"_a)
       .def("begin", &Kernel::begin, "t_us"_a)
       .def("advance", &Kernel::advance, "t_us"_a)

@@ -105,7 +105,8 @@ void Kernel::follow_reset_line() {
 void Kernel::set_drive() {
   for (int side = 0; side < 2; ++side) {
     const int channel = fault_.motors_exchanged ? 1 - side : side;
-    drive_.duty[side] = board_->duty(channel) * (fault_.side[side].reversed ? -1.0 : 1.0);
+    drive_.duty[side] = board_->duty(channel) * (fault_.side[side].reversed ? -1.0 : 1.0) *
+                        fault_.side[side].strength;
     drive_.jam[side] = fault_.side[side].stuck ? kJam_n_m_s_rad : 0.0;
   }
 }

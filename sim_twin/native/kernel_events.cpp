@@ -85,6 +85,7 @@ FaultState Faults::at(double t_s) const {
         case FaultKind::kSwappedPhases: side.swapped = true; break;
         case FaultKind::kMotorReversed: side.reversed = true; break;
         case FaultKind::kMotorStuck: side.stuck = true; break;
+        case FaultKind::kMotorWeak: side.strength *= fault.strength; break;
         case FaultKind::kMotorsExchanged:
         case FaultKind::kEncodersExchanged:
         case FaultKind::kBoardReset: break;

@@ -46,6 +46,7 @@ class Disturbances {
   X(kSwappedPhases, "swapped_phases")   \
   X(kMotorReversed, "motor_reversed")   \
   X(kMotorStuck, "motor_stuck")         \
+  X(kMotorWeak, "motor_weak")           \
   X(kMotorsExchanged, "motors_exchanged")     \
   X(kEncodersExchanged, "encoders_exchanged") \
   X(kBoardReset, "board_reset")
@@ -59,12 +60,14 @@ struct Fault {
   FaultKind kind = FaultKind::kDeadEncoder;
   bool left = true, right = true;
   double start_s = 0.0, end_s = 0.0;
+  double strength = 1.0;  // of a weak motor: share of the voltage that reaches it
 };
 
 // What is wrong at one instant.
 struct FaultState {
   struct Side {
     bool dead_a = false, dead_b = false, swapped = false, reversed = false, stuck = false;
+    double strength = 1.0;
   };
   Side side[2];
   bool board_in_reset = false;

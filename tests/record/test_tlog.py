@@ -12,6 +12,7 @@ import pytest
 
 from hil.core.errors import BadInput
 from hil.record.tlog import TlogWriter, install_dialect, read_tlog
+from hil.record.writing import Keeping
 from hil.wire import dialect
 
 START_US = 1_714_557_600_000_000
@@ -31,7 +32,7 @@ def frames() -> list[tuple[float, bytes]]:
 @pytest.fixture
 def log(tmp_path):
     path = tmp_path / "link.tlog"
-    writer = TlogWriter(path, START_US)
+    writer = TlogWriter(path, START_US, Keeping(tmp_path))
     for t_s, frame in frames():
         writer.write(t_s, frame)
     writer.close()

@@ -90,11 +90,11 @@ def test_killed_politely_both_ends_leave_as_by_ctrl_c(tmp_path, number):
             run.kill()
     assert second.returncode == 2
     assert f"in use by another `hil twin serve` (pid {server.pid})" in second.stderr
-    assert run.returncode == 130, run_said
+    assert run.returncode == 128 + number, run_said
     manifest = json.loads((folder / "manifest.json").read_text())
     assert manifest["outcome"] == "interrupted"
     assert "stopped" in (folder / "events.jsonl").read_text()
-    assert server.returncode == 130
+    assert server.returncode == 128 + number
     assert "s behind by now" in said
     assert not port.is_symlink()
     assert not frames.exists()

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hil.core.errors import BadInput
+from hil.core.files import RECORD_BYTES, read_text
 
 MM = 1e-3
 
@@ -55,7 +56,7 @@ def _read_rows(
 ) -> list[tuple[int, dict[str, tuple[str, float]]]]:
     """Return (line number, column -> (text, factor to SI)) of every row."""
     try:
-        content = path.read_text(encoding="utf-8-sig")
+        content = read_text(path, RECORD_BYTES, "utf-8-sig")
     except OSError as error:
         raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:

@@ -1,0 +1,53 @@
+"""stdout and stderr whose reader may go away (`| head`, a lost terminal): what follows is dropped.
+
+A command is not over because nobody reads on: what it still has to write elsewhere is written, and
+its exit status is its own.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import sys
+from typing import Any, TextIO
+
+_GONE = {errno.EPIPE, errno.EIO, errno.EBADF, errno.ENXIO}
+
+
+class _Outlet(io.FileIO):
+    """A descriptor that takes everything once its other end has gone, or once it has failed."""
+
+    _shut = False
+
+    def write(self, data: Any) -> int:
+        """Write, or drop; raises OSError once for anything but a reader that has gone."""
+        if self._shut:
+            return len(data)
+        try:
+            return super().write(data)
+        except OSError as error:
+            self._shut = True
+            if error.errno in _GONE:
+                return len(data)
+            raise
+
+
+def let_readers_go() -> None:
+    """Put such streams in place of stdout and stderr."""
+    if os.name != "posix":
+        return
+    sys.stdout, sys.stderr = _outlet(sys.stdout, 1), _outlet(sys.stderr, 2)
+
+
+def _outlet(stream: TextIO | None, descriptor: int) -> TextIO:
+    if not isinstance(stream, io.TextIOWrapper):
+        return open(os.devnull, "w", encoding="utf-8") if stream is None else stream
+    stream.flush()
+    return io.TextIOWrapper(
+        io.BufferedWriter(_Outlet(descriptor, "w", closefd=False)),
+        encoding=stream.encoding,
+        errors=stream.errors,
+        line_buffering=stream.line_buffering,
+        write_through=stream.write_through,
+    )

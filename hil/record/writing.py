@@ -1,0 +1,104 @@
+"""Files of a record while it is written: the first one that cannot be written ends the record.
+
+A disk that fills up, a limit on the size of files, a folder that goes away: the first such error is
+raised as RecordFault, once. Whatever is written after it is dropped without a word, so that the
+robot can be stopped by the same code as ever. What reached the disk before stays readable.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import IO
+
+from hil.core.errors import BadInput, RecordFault
+
+# Room for the last manifest on a disk that has none left, bytes.
+_RESERVE_BYTES = 65_536
+_RESERVE = ".reserve"
+
+
+class Keeping:
+    """Whether a record can still be written, and the space kept back for its end."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._reserve = folder / _RESERVE
+        self.fault: RecordFault | None = None
+
+    def fail(self, error: OSError, path: Path | None = None) -> RecordFault:
+        """Note the first error, and return what is to be raised for it."""
+        if self.fault is None:
+            what = error.strerror or " ".join(str(error).split())
+            where = f" ({path.name})" if path is not None else ""
+            self.fault = RecordFault(
+                f"record {self._folder}: cannot be written any more: {what}{where}; "
+                "what was written before is kept"
+            )
+        return self.fault
+
+    def reserve(self) -> None:
+        """Take the folder for this process and keep space back; raises BadInput, OSError."""
+        try:
+            file = self._reserve.open("xb")
+        except FileExistsError:
+            raise BadInput(
+                f"--out {self._folder}: another process writes there; name a new one"
+            ) from None
+        with file:
+            try:
+                if hasattr(os, "posix_fallocate"):
+                    os.posix_fallocate(file.fileno(), 0, _RESERVE_BYTES)
+                else:
+                    file.write(bytes(_RESERVE_BYTES))
+            except OSError as error:
+                if error.errno == errno.ENOSPC:
+                    raise
+
+    def release(self) -> None:
+        """Give the space kept back to what is written last."""
+        with suppress(OSError):
+            self._reserve.unlink(missing_ok=True)
+
+    def check(self, file: Path) -> None:
+        """Raise RecordFault when a file of the record has gone away."""
+        if self.fault is None and not file.exists():
+            raise self.fail(FileNotFoundError(errno.ENOENT, "the folder has gone away"))
+
+
+class GuardedFile:
+    """A binary file of a record; after the first error of any of them nothing is written."""
+
+    def __init__(self, path: Path, keeping: Keeping) -> None:
+        self._path = path
+        self._keeping = keeping
+        self._file: IO[bytes] = path.open("wb")
+        self._write = self._file.write
+
+    def write(self, data: bytes) -> int:
+        """Append bytes; raises RecordFault once."""
+        if self._keeping.fault is not None:
+            return 0
+        try:
+            return self._write(data)
+        except OSError as error:
+            raise self._keeping.fail(error, self._path) from None
+
+    def flush(self) -> None:
+        """Hand everything to the system; raises RecordFault once."""
+        if self._keeping.fault is not None:
+            return
+        try:
+            self._file.flush()
+        except OSError as error:
+            raise self._keeping.fail(error, self._path) from None
+
+    def close(self) -> None:
+        """Flush and close; raises RecordFault once. Safe to call twice."""
+        try:
+            self._file.close()
+        except OSError as error:
+            if self._keeping.fault is None:
+                raise self._keeping.fail(error, self._path) from None

@@ -1,0 +1,210 @@
+"""Every fault x instant x law on the twin: stopped in time or recovered, bounded, told by its name.
+
+The robot's true motion is watched between the ticks too, and on after the host has let go. World
+frame, SI units; times are host times.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+import re
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hil.config.load import load_scenario
+from hil.core.errors import HilError
+from hil.replays.exact import replay
+from hil.rigs.opening import open_rig
+from hil.runs.execute import RunSpec, execute, execute_in_memory
+from hil.study.fault_kinds import CLOSING, INSTANTS, ROWS, FaultRow
+
+if TYPE_CHECKING:
+    from hil.core.rig import Frame, Rig, Truth
+    from hil.record.reader import RunRecord
+
+SCENARIO, DURATION_S = "scenario-1", 14.0
+LAWS = ("pid", "asg-ism")
+# Limits of a cell. The drive is off REST_S after the stop at the latest; what is left is the robot's
+# own coasting against its friction, which takes 0.8 to 1.7 m/s^2 off its speed on the shipped robot.
+REST_S, COAST_M_S2, PEAK_M_S, TRAVEL_M = 0.25, 0.7, 1.0, 1.0
+# Slower than this is rest.
+_REST_M_S, _REST_RAD_S = 0.02, 0.1
+_AFTERWARDS_S = 0.6
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """What one fault at one instant came to; `flaws` is empty where the cell is met."""
+
+    fault: str
+    instant: str
+    law: str
+    outcome: str
+    said: str
+    rest_s: float  # from detection to rest; 0 for a run that was not stopped
+    peak_m_s: float  # true speed from the fault on
+    travel_m: float  # true path from the fault to the stop's end
+    detected_s: float  # from the fault to the stop; NaN for a run that was not stopped
+    flaws: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the cell with null where there is no figure."""
+        tree = dataclasses.asdict(self) | {"met": not self.flaws}
+        bare = {k: v for k, v in tree.items() if not (isinstance(v, float) and math.isnan(v))}
+        return dict.fromkeys(tree) | bare
+
+
+class WatchedRig:
+    """A rig that keeps the true motion at every wait."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self.stream = rig.stream
+        self.now_s, self.poll_frame, self.truth = rig.now_s, rig.poll_frame, rig.truth
+        self.begin_s = math.nan
+        self.motion: list[tuple[float, Truth]] = []
+
+    now_s: Any
+    poll_frame: Any
+    truth: Any
+
+    def wait(self, until_s: float) -> None:
+        """Wait, then look."""
+        self._rig.wait(until_s)
+        truth = self._rig.truth()
+        if truth is not None:
+            self.motion.append((self._rig.now_s(), truth))
+
+    def begin(self, t_start_s: float) -> None:
+        """Note where the controlled part begins."""
+        self.begin_s = t_start_s
+        self._rig.begin(t_start_s)
+
+    def close(self) -> None:
+        """Watch on after the host has let go, then release the rig."""
+        end_s = self._rig.now_s() + _AFTERWARDS_S
+        while self._rig.now_s() < end_s:
+            self.wait(min(self._rig.now_s() + 0.005, end_s))
+            while self._frame_is_there():
+                pass
+        self._rig.close()
+
+    def _frame_is_there(self) -> Frame | None:
+        frame: Frame | None = self._rig.poll_frame()
+        return frame
+
+
+def cells(
+    faults: Sequence[str] = (), instants: Sequence[str] = (), laws: Sequence[str] = ()
+) -> list[tuple[str, str, str]]:
+    """Return the (fault, instant, law) of the matrix, or of the part that is named."""
+    names = [row.name for row in ROWS]
+    return [
+        (fault, instant, law)
+        for fault in (faults or names)
+        for instant in (instants or tuple(INSTANTS))
+        for law in (laws or LAWS)
+    ]
+
+
+def run_cell(fault: str, instant: str, law: str, seed: int = 1) -> Cell:
+    """Run one cell and judge it; at speed the record is written, read and replayed too."""
+    row = next(row for row in ROWS if row.name == fault)
+    start_s = INSTANTS[instant] + (DURATION_S + 0.02 if instant == CLOSING else 0.0)
+    scenario = load_scenario(SCENARIO, [f"duration_s={DURATION_S:g}", *row.overrides(start_s)])
+    with tempfile.TemporaryDirectory() as folder:
+        spec = RunSpec(
+            scenario, "twin", "pose", law, "asg-ism", seed, Path(folder) / "run", rerun=False
+        )
+        rig = WatchedRig(open_rig("twin", scenario, "pose", seed))
+        flaws: list[str] = []
+        if instant == "at speed":
+            record = execute(spec, rig=rig)
+            flaws += _replay_flaws(spec.out)
+        else:
+            record = execute_in_memory(spec, rig)
+    return _judged(row, instant, law, record, rig, start_s, flaws)
+
+
+def _replay_flaws(folder: Path) -> list[str]:
+    try:
+        report = replay(folder)
+    except HilError as error:
+        return [f"record not replayable: {error}"]
+    return [] if report.identical else [f"replay differs first in {report.first}"]
+
+
+def _judged(
+    row: FaultRow, instant: str, law: str, record: RunRecord, rig: WatchedRig, start_s: float,
+    flaws: list[str],
+) -> Cell:  # fmt: skip
+    manifest, t_s = record.manifest, record.samples["t_s"]
+    said = "; ".join([manifest.outcome_detail, *record.diagnoses()]).strip("; ")
+    stopped = manifest.outcome != "complete"
+    begin_s = rig.begin_s if rig.begin_s == rig.begin_s else math.inf
+    ended_s = begin_s + float(t_s[-1]) if t_s.size else begin_s
+    after = [(at_s, truth) for at_s, truth in rig.motion if at_s >= begin_s + start_s]
+    peak_m_s = max((abs(truth.eta1_m_s) for _, truth in after), default=0.0)
+    watched = after if stopped else []
+    travel_m = sum(
+        math.hypot(b.pose.x_m - a.pose.x_m, b.pose.y_m - a.pose.y_m)
+        for (_, a), (_, b) in itertools.pairwise(watched)
+    )
+    rest_s = max(
+        (at_s - ended_s for at_s, truth in rig.motion if at_s > ended_s and _moves(truth)),
+        default=0.0,
+    )
+    speeds_m_s = [abs(truth.eta1_m_s) for at_s, truth in rig.motion if at_s <= ended_s + REST_S]
+    limit_s = REST_S + max(speeds_m_s[-1:] or [0.0]) / COAST_M_S2
+    if rest_s > limit_s:
+        flaws.append(f"moves until {rest_s:.3f} s after the stop (limit {limit_s:.3f} s)")
+    if peak_m_s > PEAK_M_S:
+        flaws.append(f"reaches {peak_m_s:.2f} m/s (limit {PEAK_M_S:g} m/s)")
+    if travel_m > TRAVEL_M:
+        flaws.append(f"travels {travel_m:.2f} m after the fault (limit {TRAVEL_M:g} m)")
+    holds = all(verdict.holds for verdict in record.verdicts()) if t_s.size else False
+    noticed = stopped or not holds
+    if noticed and not re.search(row.named, said):
+        flaws.append(f"not told by its name: {said or 'nothing said'}")
+    if not stopped and not holds and not row.slow:
+        flaws.append("the run goes on and misses its requirements")
+    detected_s = ended_s - (begin_s + max(start_s, 0.0)) if stopped and t_s.size else math.nan
+    return Cell(
+        row.name, instant, law, manifest.outcome, said, rest_s, peak_m_s, travel_m, detected_s,
+        tuple(flaws),
+    )  # fmt: skip
+
+
+def _moves(truth: Truth) -> bool:
+    return abs(truth.eta1_m_s) > _REST_M_S or abs(truth.theta_dot_rad_s) > _REST_RAD_S
+
+
+def fault_free(seed: int) -> str:
+    """Run one fault-free run of the suite, drawn by its seed; return what was said of it, "" for none.
+
+    Scenarios and laws take turns; every second one is off: slip, another battery, a robot that is not
+    as its file says, a link that loses.
+    """
+    scenario = ("scenario-1", "scenario-2", "scenario-3", "circle")[seed % 4]
+    law = LAWS[seed // 4 % 2]
+    overrides = list(_VARIANTS[seed // 8 % len(_VARIANTS)])
+    if scenario == "circle":
+        overrides.append("duration_s=20")
+    loaded = load_scenario(scenario, overrides)
+    record = execute_in_memory(RunSpec(loaded, "twin", "pose", law, "asg-ism", seed, Path()))
+    said = [record.manifest.outcome_detail, *record.diagnoses()]
+    told = "; ".join(text for text in said if text)
+    return f"{scenario} {law} seed {seed} {' '.join(overrides)}: {told}" if told else ""
+
+
+_VARIANTS = (
+    (),
+    ("robot.variant=slip",),
+    ("mismatch={mass_kg = 1.15, wheel_radius_m = 0.97}",),
+    ("link.loss_ratio=0.02",),
+)
