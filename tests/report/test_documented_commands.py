@@ -49,9 +49,10 @@ class Line(NamedTuple):
 
 
 def block_lines(page: Path) -> Iterator[tuple[int, str]]:
-    """Yield (number, text) of every line of a fenced or indented block."""
+    """Yield (number, text) of every line of a fenced or indented block, continued ones as one."""
     fenced = False
-    for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), start=1):
+    text = re.sub(r"\\\n\s*", "", page.read_text(encoding="utf-8"))
+    for number, line in enumerate(text.splitlines(), start=1):
         if line.startswith("```"):
             fenced = not fenced
         elif fenced or line.startswith("    "):
