@@ -7,7 +7,6 @@ columns of `samples.parquet` a mapping may name those of EXTRA.
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +15,7 @@ import numpy as np
 
 from hil.config.load import build
 from hil.core.errors import BadInput
+from hil.core.files import read_toml
 from hil.record.log_csv import _Cells, _chosen, _read_table
 from hil.record.log_mapping import STANDARD, LogMapping, Source
 from hil.record.log_signals import counter_hint, fall_text, in_order, scaled
@@ -96,13 +96,7 @@ def read_series(log: Path, mapping: Path | None) -> LogSeries:
 def _mapping(path: Path | None) -> LogMapping:
     if path is None:
         return LogMapping()
-    try:
-        tree = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(f"mapping {path}: cannot be read: {error}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise BadInput(f"{path}: not valid TOML: {error}") from None
-    settings = build(LogMapping, tree, str(path))
+    settings = build(LogMapping, read_toml(path, "mapping"), str(path))
     for name, source in settings.columns.items():
         if (name not in SAMPLE_NAMES and name not in EXTRA) or name == "t_s":
             raise BadInput(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from hil.config.fit import check_fit
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput
-from hil.core.files import replace_file
+from hil.core.files import PART, replace_file
 from hil.core.registries import source_digests
 from hil.record.manifest import Manifest
 from hil.report.circle import CircleStudy
@@ -187,7 +187,7 @@ def _refuse_other_plan(
 def _refuse_other_records(folder: Path, specs: Sequence[RunSpec]) -> None:
     """Raise BadInput unless the folder holds records of these specs and nothing else."""
     runs = {spec.out.name: spec for spec in specs}
-    ours = {PLAN, f"{PLAN}.part", SET_ASIDE, REPORT, LOCK, *runs}
+    ours = {PLAN, f"{PLAN}{PART}", SET_ASIDE, REPORT, LOCK, *runs}
     found = {item.name for item in folder.iterdir()} if folder.is_dir() else {""}
     records = [name for name in runs if name in found]
     if not found <= ours or not (records or PLAN in found):

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -23,6 +22,7 @@ from hil.config.gains import Gains
 from hil.config.load import build, builtin_names, load_robot, load_scenario
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
+from hil.core.files import read_toml
 from hil.core.registries import source_digests
 from hil.study.tune import (
     CASES,
@@ -121,8 +121,8 @@ def load_tasks(names: Sequence[str], robot: str | None, overrides: Sequence[str]
 def _is_deck(name: str) -> bool:
     if name in builtin_names("decks"):
         return True
-    with suppress(OSError, ValueError):
-        return "scenarios" in tomllib.loads(Path(name).read_text(encoding="utf-8"))
+    with suppress(BadInput):
+        return "scenarios" in read_toml(Path(name))
     return False
 
 
