@@ -12,6 +12,7 @@ from random import Random
 from typing import TYPE_CHECKING, Any
 
 from hil.config.fit import check_fit
+from hil.config.gains import only_gains_of
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput
 from hil.core.files import PART, replace_file
@@ -153,7 +154,7 @@ def claim(
 
 
 def _identity(spec: RunSpec) -> dict[str, Any]:
-    tree = json.dumps(spec.scenario.model_dump(mode="json"), sort_keys=True)
+    tree = json.dumps(_task(spec.scenario.model_dump(mode="json"), spec), sort_keys=True)
     return {
         "scenario": spec.scenario.name,
         "scenario_sha256": hashlib.sha256(tree.encode()).hexdigest(),
@@ -164,6 +165,10 @@ def _identity(spec: RunSpec) -> dict[str, Any]:
         "seed": spec.seed,
         "folder": spec.out.name,
     } | ({"texts": texts} if (texts := source_digests([spec.outer])) else {})
+
+
+def _task(tree: dict[str, Any], spec: RunSpec) -> dict[str, Any]:
+    return only_gains_of(tree, [spec.outer])
 
 
 def _refuse_other_plan(
@@ -206,7 +211,8 @@ def _refuse_other_records(folder: Path, specs: Sequence[RunSpec]) -> None:
 def _is_of(manifest: Manifest, spec: RunSpec) -> bool:
     names = ("target", "camera", "outer", "inner", "seed")
     same = all(getattr(manifest, name) == getattr(spec, name) for name in names)
-    return same and manifest.scenario == json.loads(spec.scenario.model_dump_json())
+    ours = json.loads(spec.scenario.model_dump_json())
+    return same and _task(manifest.scenario, spec) == _task(ours, spec)
 
 
 @dataclass(frozen=True, slots=True)
