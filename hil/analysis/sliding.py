@@ -62,7 +62,8 @@ class LawFacts:
 
 def law_ran(columns: Columns) -> NDArray[np.bool_]:
     """Return at which ticks the law ran: all but those in which the control stop commands rest."""
-    return ~np.all([columns[name] == 0.0 for name in _RESTING], axis=0)
+    resting: NDArray[np.bool_] = np.all([columns[name] == 0.0 for name in _RESTING], axis=0)
+    return ~resting
 
 
 def disturbance(columns: Columns, who: str, d0_m: float) -> Array:
@@ -105,30 +106,40 @@ def figures(columns: Columns, who: str, facts: LawFacts) -> dict[str, float]:
         "disturbance_max_m_s3": float(most),
         "alpha_over_d90_ratio": float(ratio),
         "s_over_eps_median_ratio": float(np.median(s / eps)) if layered else math.nan,
-        "sliding_term_share": _share(columns, ran, facts) if layered else math.nan,
+        "sliding_term_share": _share(columns, ran, facts) if size.size else math.nan,
         "s_settling_s": _settling(columns["t_s"][ran], s <= eps) if layered else math.nan,
         "sliding_acts": float(acts) if known else math.nan,
     }
 
 
 def _share(columns: Columns, ran: NDArray[np.bool_], facts: LawFacts) -> float:
-    """Return the median share of the sliding term alpha s/(||s|| + eps) in the jerk commanded.
+    """Return the median share of the sliding term in the jerk commanded.
 
-    ||term|| / (||term|| + ||rest||), the rest being what the command has beside it.
+    ||term|| / (||term|| + ||rest||), the rest being what the command has beside it. The term is
+    alpha s/(||s|| + eps), or what the law's own columns say.
     """
-    names = ("s_x_m_s2", "s_y_m_s2", "eps_m_s2", "v1_m_s3", "u2_m_s2", "zeta_m_s2")
-    s_x, s_y, eps, v1, u2, zeta = (columns[name][ran] for name in names)
+    term_x, term_y = (values[ran] for values in _terms(columns, facts))
+    v1, u2, zeta = (columns[name][ran] for name in ("v1_m_s3", "u2_m_s2", "zeta_m_s2"))
     theta, eta1, w = (
         columns[f"est_{name}"][ran] for name in ("theta_rad", "eta1_m_s", "theta_dot_rad_s")
     )
-    pull = -facts.alpha_m_s3 / (np.hypot(s_x, s_y) + eps)
     along, across = v1 - eta1 * w * w, 2.0 * zeta * w - eta1 * u2 / facts.d0_m  # A + B v
     cos, sin = np.cos(theta), np.sin(theta)
-    rest_x = cos * along - sin * across - pull * s_x
-    rest_y = sin * along + cos * across - pull * s_y
-    term = np.hypot(pull * s_x, pull * s_y)
-    both = term + np.hypot(rest_x, rest_y)
-    return float(np.median(np.divide(term, both, out=np.zeros_like(term), where=both > 0.0)))
+    term = np.hypot(term_x, term_y)
+    rest = np.hypot(cos * along - sin * across - term_x, sin * along + cos * across - term_y)
+    both = term + rest
+    if not np.isfinite(both).any():
+        return math.nan
+    return float(np.nanmedian(np.divide(term, both, out=np.zeros_like(term), where=both > 0.0)))
+
+
+def _terms(columns: Columns, facts: LawFacts) -> tuple[Array, Array]:
+    """Return the sliding term in the jerk wanted, world X and Y."""
+    if "slide_x_m_s3" in columns:
+        return columns["slide_x_m_s3"], columns["slide_y_m_s3"]
+    s_x, s_y = columns["s_x_m_s2"], columns["s_y_m_s2"]
+    pull = -facts.alpha_m_s3 / (np.hypot(s_x, s_y) + columns["eps_m_s2"])
+    return pull * s_x, pull * s_y
 
 
 def _settling(t_s: Array, inside: NDArray[np.bool_]) -> float:
