@@ -12,7 +12,8 @@ sliding-mode control algorithm", IEEE TAC 65, 2020): with b = s + h w the next s
 
     s+ + h l1 sqrt(L) s+/||s+||^(1/2) + h^2 l0 L Sgn(s+) = b
 
-whose length has one root: s+ = 0 where ||b|| <= h^2 l0 L, and along b else.
+whose length has one root: s+ = 0 where ||b|| <= h^2 l0 L, and along b else. Nothing switches; under a
+disturbance d the surface is kept to h d.
 """
 
 from __future__ import annotations
