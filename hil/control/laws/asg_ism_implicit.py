@@ -47,7 +47,7 @@ class AsgIsmImplicitGains(StageGains):
     alpha_m_s3: float = quantity("m/s^3", "gain of the sliding term", ge=0, le=1e4)
     mu0_s: float = quantity("s", "mu = 1/(t + mu0)", gt=0, le=100)
     sigma_m_s2: float = quantity("m/s^2", "scale of the cost H in Psi", ge=0, le=100)
-    cost: Cost = "sum"
+    cost: Cost = "norm"
 
 
 @OUTER_LAWS.register(
