@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import cv2
 
 from hil.analysis.metrics import LinkStats
+from hil.board.wheel_laws import WHEEL_LAWS
 from hil.config.fit import check_fit
 from hil.config.limits import check_edges, wheel_speed_max_rad_s
 from hil.config.robot import BUILT_IN_PLANT
@@ -48,9 +49,6 @@ if TYPE_CHECKING:
     from hil.core.types import OuterLaw
     from hil.record.memory import RunSink
     from hil.record.reader import RunRecord
-
-# Value of the board's parameter LAW for each wheel law.
-INNER_LAWS = {"asg-ism": 0.0, "pid": 1.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,7 +196,7 @@ def board_parameters(scenario: Scenario, inner: str) -> dict[str, float]:
     """Return every board parameter as this run needs it; raises BadInput where the board cannot count."""
     parameters = scenario.board | {
         "ENC_COUNTS": float(scenario.robot.encoder_counts_per_turn),
-        "LAW": INNER_LAWS[inner],
+        "LAW": WHEEL_LAWS[inner],
     }
     check_edges(parameters)
     return parameters

@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hil.board import _firmware
+from hil.board.wheel_laws import WHEEL_LAWS, require_wheel_law
 from hil.config.events import Disturbance, Fault, Zone
 from hil.config.load import load_scenario
 from hil.config.mismatch import true_robot
-from hil.core.errors import BadInput, RigFault
+from hil.core.errors import RigFault
 from hil.wire import dialect
 from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM, FrameReader, FrameWriter
 from hil.wire.identity import dialect_hash, parameter_hash
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
 
 Speeds = tuple[float, float]
 
-LAWS = {"asg-ism": 0.0, "pid": 1.0}
 # Robots of the bench: as the host believes it, as the default mismatch of 10 % makes it, or, any
 # other number, drawn from the box of that mismatch.
 BELIEVED, DEFAULT = -1, 0
@@ -246,9 +246,7 @@ class Trace:
 
 def run(law: str, case: Case, parameters: Mapping[str, float], seed: int = DEFAULT) -> Trace:
     """Run a case with a wheel law; `parameters` go over the board's defaults."""
-    if law not in LAWS:
-        raise BadInput(f"inner law {law!r}: unknown; choose one of {', '.join(LAWS)}")
-    rig = _Rig(case, {**parameters, "LAW": LAWS[law]}, seed)
+    rig = _Rig(case, {**parameters, "LAW": WHEEL_LAWS[require_wheel_law(law)]}, seed)
     left, right = (_state_index(f"omega_{side}_rad_s") for side in ("left", "right"))
     charge = _state_index("charge_ratio")
     charge_start = rig.kernel.state()[charge]
@@ -333,7 +331,7 @@ def table(
     found: dict[str, dict[str, dict[str, float]]] = {}
     for name, case in CASES.items():
         found[name] = {}
-        for law in LAWS:
+        for law in WHEEL_LAWS:
             runs = [figures(case, run(law, case, parameters, seed)) for seed in seeds]
             found[name][law] = {
                 field.name: float(np.mean([getattr(item, field.name) for item in runs]))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import Any
 
+from hil.board.wheel_laws import SUMMARIES
 from hil.config.fields import Setting, settings
 from hil.config.load import builtin_names
 from hil.core.errors import BadInput
@@ -14,7 +15,6 @@ from hil.core.figures import BY_NAME
 from hil.core.files import parse_toml
 from hil.core.registries import BY_PLURAL, ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES
 from hil.core.registry import BUILT_IN, Entry, Registry
-from hil.runs.execute import INNER_LAWS
 
 # Where a scenario has the settings of a thing of a kind.
 _SET_BY = {
@@ -101,8 +101,7 @@ def listing(kind: str, from_files: Sequence[str] = ()) -> Listing:
     if from_files:
         raise BadInput(f"{from_files[0]}: {kind} do not come from Python files")
     if kind == "wheel-laws":
-        said = {"asg-ism": "averaged sub-gradient integral sliding mode", "pid": "PID"}
-        items = [Item(name, f"{said.get(name, name)}, on the board") for name in INNER_LAWS]
+        items = [Item(name, f"{said}, on the board") for name, said in SUMMARIES.items()]
     elif kind == "figures":
         items = [Item(m.name, m.definition, unit=m.unit) for m in BY_NAME.values()]
     else:
