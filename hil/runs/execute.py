@@ -33,7 +33,7 @@ from hil.record.recorder import Recorder
 from hil.record.schema import own_columns
 from hil.record.tape import TapedRig
 from hil.record.timeline import Timeline
-from hil.rigs.opening import REPLAY, SIMULATED, open_rig
+from hil.rigs.opening import REPLAY, is_simulated, open_rig
 from hil.runs.interruption import CtrlC
 from hil.runs.law_guard import GuardedLaw
 from hil.runs.outside import fault_of
@@ -89,7 +89,7 @@ def camera_for(scenario: Scenario, target: str, asked: str | None) -> str:
     """Return the camera asked for, or the target's default one."""
     if target.startswith(REPLAY):
         return "as recorded"
-    return asked or (scenario.camera_source if target in SIMULATED else "0")
+    return asked or (scenario.camera_source if is_simulated(target) else "0")
 
 
 def new_folder(stem: str) -> Path:
@@ -239,7 +239,7 @@ def used_things(spec: RunSpec) -> list[tuple[str, Entry]]:
 def _plant_of(spec: RunSpec) -> list[Plugin]:
     """Return what worked out the robot's motion where the harness did not, for the record."""
     where = spec.scenario.robot.plant
-    if spec.target not in SIMULATED or where == BUILT_IN_PLANT:
+    if not is_simulated(spec.target) or where == BUILT_IN_PLANT:
         return []
     path = Path(where)
     text = None if where.startswith("tcp:") or not path.is_file() else path.read_text("utf-8")

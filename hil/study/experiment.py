@@ -22,7 +22,7 @@ from hil.record.manifest import Manifest
 from hil.report.circle import CircleStudy
 from hil.report.compare import compare_runs, refuse_other_task, to_json
 from hil.report.repeats import Repeats, repeats_of
-from hil.rigs.opening import SIMULATED
+from hil.rigs.opening import is_simulated
 from hil.runs.execute import RunSpec, camera_for
 from hil.study import ideal_circle
 from hil.study.side_by_side import manifest_of, still_to_do
@@ -80,7 +80,7 @@ def deck_specs(deck: Deck, conditions: Conditions, folder: Path) -> list[RunSpec
         for law in deck.laws
         for inner in conditions.inners
     ]
-    simulated = conditions.target in SIMULATED
+    simulated = is_simulated(conditions.target)
     rng = Random(f"{conditions.seed} order of runs")
     specs = []
     for seed in range(conditions.seed, conditions.seed + conditions.repeats):

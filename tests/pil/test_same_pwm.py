@@ -8,7 +8,7 @@ import pytest
 import hil.runs.execute
 from hil.board import _firmware
 from hil.config.load import load_scenario
-from hil.rigs.opening import twin_setup
+from hil.rigs.targets.simulated import twin_setup
 from hil.runs.execute import RunSpec, execute
 from hil.wire.framing import HOST_SYSTEM, FrameReader
 from sim_twin.pil import Pil
