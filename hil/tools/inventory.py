@@ -13,7 +13,7 @@ from hil.config.load import builtin_names
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME
 from hil.core.files import parse_toml
-from hil.core.registries import BY_PLURAL, ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES
+from hil.core.registries import BY_PLURAL, ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES, VEHICLES
 from hil.core.registry import BUILT_IN, Entry, Registry
 
 # Where a scenario has the settings of a thing of a kind.
@@ -22,6 +22,7 @@ _SET_BY = {
     ESTIMATORS.kind: "control.estimator_settings.",
     LOCALISERS.kind: "camera.localiser_settings.",
     REFERENCES.kind: "reference.",
+    VEHICLES.kind: "robot.vehicle.",
 }
 
 
@@ -126,9 +127,9 @@ def _registered(kind: str, registry: Registry, from_files: Sequence[str]) -> Lis
 def _item(entry: Entry, registry: Registry) -> Item:
     own = entry.settings
     keys = tuple(settings(own)) if own is not None else ()
-    if registry is REFERENCES:
+    if registry in (REFERENCES, VEHICLES):
         keys = tuple(key for key in keys if key.key != "kind")
-    set_by = _SET_BY[registry.kind].format(entry.key)
+    set_by = _SET_BY.get(registry.kind, "").format(entry.key)
     return Item(
         entry.name, entry.summary, entry.origin, keys, entry.search, entry.trace, set_by=set_by
     )

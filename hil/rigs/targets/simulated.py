@@ -24,7 +24,10 @@ def twin(asked: Asked) -> Rig:
 
 
 @TARGETS.register(
-    "pil", summary="the simulated robot and the board's own binary under simavr", simulated=True, order=1
+    "pil",
+    summary="the simulated robot and the board's own binary under simavr",
+    simulated=True,
+    order=1,
 )
 def pil(asked: Asked) -> Rig:
     """Return the twin under the board's binary; raises BadInput where its simulator is missing."""
