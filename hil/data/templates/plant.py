@@ -10,14 +10,22 @@ As it stands, wheels follow their voltage with a lag and the robot rolls without
 """
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 from hil import serve_plant
 
 
 class MyThing:
+    """Wheels that follow their voltage with a lag, on a robot that rolls without slip."""
+
     takes = ("load_left_n_m",)  # what it knows of docs/twin.md's disturbances
 
-    def reset(self, robot, start, dt_s, seed):
+    def reset(
+        self, robot: Mapping[str, Any], start: Mapping[str, float], dt_s: float, seed: int
+    ) -> None:
+        """Stand at rest at `start` (x_m, y_m, theta_rad); draw from `seed` alone, if at all."""
+        del dt_s, seed
         # robot: the robot file as a dictionary; start: pose at rest, wheel angles zero.
         self.r, self.track, self.d0 = robot["wheel_radius_m"], robot["track_m"], robot["d0_m"]
         motor = robot["motor"]
@@ -25,7 +33,10 @@ class MyThing:
         self.x, self.y, self.theta = start["x_m"], start["y_m"], start["theta_rad"]
         self.omega, self.angle = [0.0, 0.0], [0.0, 0.0]
 
-    def step(self, volts, dt_s, loads):
+    def step(
+        self, volts: tuple[float, float], dt_s: float, loads: Mapping[str, float]
+    ) -> dict[str, float]:
+        """Move on by `dt_s` and return the state then."""
         # volts: left, right, held for dt_s; loads: the disturbances of `takes` in force now.
         share = 1 - math.exp(-dt_s / 0.08)  # lag of 80 ms
         for side in (0, 1):
