@@ -23,8 +23,9 @@ from hil.config.load import load_scenario
 from hil.config.mismatch import true_robot
 from hil.core.errors import RigFault
 from hil.wire import dialect
-from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM, FrameReader, FrameWriter
+from hil.wire.framing import FrameReader, FrameWriter
 from hil.wire.identity import dialect_hash, parameter_hash
+from hil.wire.messages import arming_message, set_parameter_message
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -178,26 +179,9 @@ class _Rig:
     def _bring_up(self, parameters: Mapping[str, float]) -> None:
         self.advance(_BOOT_S)
         for name, value in parameters.items():
-            self._send(
-                dialect.MAVLink_param_set_message(
-                    BOARD_SYSTEM,
-                    BOARD_COMPONENT,
-                    name.encode(),
-                    value,
-                    dialect.MAV_PARAM_TYPE_REAL32,
-                )
-            )
+            self._send(set_parameter_message(name, value))
             self.advance(self.now_s + _FRAME_S)
-        halves = [
-            float(part)
-            for value in (dialect_hash(), parameter_hash({**_defaults(), **parameters}))
-            for part in divmod(value, 1 << 16)
-        ]
-        arm = dialect.MAV_CMD_COMPONENT_ARM_DISARM
-        values = [1.0, 0.0, *halves, 0.0]
-        self._send(
-            dialect.MAVLink_command_long_message(BOARD_SYSTEM, BOARD_COMPONENT, arm, 0, *values)
-        )
+        self._send(arming_message(dialect_hash(), parameter_hash({**_defaults(), **parameters})))
         self.advance(self.now_s + 0.05)
         if self.state != dialect.HIL_STATE_ARMED:
             raise RigFault("wheel bench: the board refuses to arm with these parameters")
