@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 
-from hil.board.wheel_laws import require_wheel_law
+from hil.board.wheel_laws import WHEEL_LAWS, require_wheel_law
 from hil.config.base import PlainName, Section
 from hil.config.control import OuterLawName
 from hil.config.gains import only_gains_of
@@ -39,7 +39,9 @@ def _wheel_law(name: str) -> str:
         raise ValueError(str(error)) from None
 
 
-InnerLawName = Annotated[str, AfterValidator(_wheel_law)]
+InnerLawName = Annotated[
+    str, AfterValidator(_wheel_law), Field(json_schema_extra={"enum": list(WHEEL_LAWS)})
+]
 
 
 # Unlike the figures of a run, every run has it, also one that ended early.
