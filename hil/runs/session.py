@@ -268,6 +268,7 @@ class Session:
         waited = False
         while True:
             now_s = rig.now_s()
+            self._supervisor.check_clock(now_s)
             self._take_all(now_s)
             if now_s >= until_s:
                 break
@@ -347,6 +348,7 @@ class Session:
         if self._refusal:
             raise RigFault(f"board: {self._refusal}")
         link = self._parts.link
+        self._supervisor.check_host(now_s)
         self._supervisor.check(now_s, link, self._report)
         if self._report is not None:
             self._plausibility.check(now_s, self._report, link.info.pwm_top_counts)
