@@ -78,14 +78,13 @@ class FaultyMaker:
             return self._joined(image, index, (fault.x_m, fault.y_m, 0.0))
         return image
 
-    def _joined(
-        self, image: NDArray[np.uint8], index: int, other: PoseTuple
-    ) -> NDArray[np.uint8]:
+    def _joined(self, image: NDArray[np.uint8], index: int, other: PoseTuple) -> NDArray[np.uint8]:
         """Return the image with a second robot: the noise of a frame is the same whatever it shows."""
         assert self._maker is not None
         alone, empty = self._maker.make(index, (other, other)), self._maker.make(index, ())
         there = np.any(alone != empty, axis=2, keepdims=True)
-        return np.where(there, alone, image)
+        joined: NDArray[np.uint8] = np.where(there, alone, image)
+        return joined
 
 
 def covered_front(camera: CameraConfig) -> CameraConfig:

@@ -45,7 +45,9 @@ class Supervisor:
         """Raise RigFault when the host's clock, which must never, has gone back; once for each time."""
         back_s, self._newest_s = self._newest_s - now_s, now_s
         if back_s > 0.0:
-            raise RigFault(f"host: its clock went back by {back_s:.3f} s; nothing can be timed by it")
+            raise RigFault(
+                f"host: its clock went back by {back_s:.3f} s; nothing can be timed by it"
+            )
 
     def check_host(self, now_s: float) -> None:
         """Raise RigFault when the host itself was away for longer than the board waits for it."""

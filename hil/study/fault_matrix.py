@@ -20,9 +20,10 @@ from hil.config.load import load_scenario
 from hil.core.errors import HilError
 from hil.core.types import wrap_pi
 from hil.replays.exact import replay
-from hil.rigs.opening import open_rig
+from hil.rigs.opening import frame_maker, twin_setup
 from hil.runs.execute import RunSpec, execute, execute_in_memory
 from hil.study.fault_kinds import CLOSING, INSTANTS, ROWS, FaultRow
+from sim_twin.twin import Twin
 
 if TYPE_CHECKING:
     import numpy as np
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from hil.core.rig import Frame
     from hil.core.types import Pose
     from hil.record.reader import RunRecord
-    from sim_twin.twin import Twin
 
 SCENARIO, DURATION_S = "scenario-1", 14.0
 LAWS = ("pid", "asg-ism")
@@ -159,7 +159,8 @@ def run_cell(fault: str, instant: str, law: str, seed: int = 1) -> Cell:
         spec = RunSpec(
             scenario, "twin", row.camera, law, "asg-ism", seed, Path(folder) / "run", rerun=False
         )
-        rig = WatchedRig(open_rig("twin", scenario, row.camera, seed))
+        twin = Twin(twin_setup(scenario, seed), frame_maker(scenario, row.camera, seed))
+        rig = WatchedRig(twin)
         flaws: list[str] = []
         if instant == "at speed":
             record = execute(spec, rig=rig)
@@ -223,29 +224,3 @@ def _ended_s(begin_s: float, t_s: NDArray[np.float64], rig: WatchedRig) -> float
         return begin_s
     last_s = begin_s + float(t_s[-1])
     return max([last_s, *(to_s for from_s, to_s in rig.away_s if from_s <= last_s + 0.1 < to_s)])
-
-
-def fault_free(seed: int) -> str:
-    """Run one fault-free run of the suite, drawn by its seed; return what was said of it, "" for none.
-
-    Scenarios and laws take turns; every second one is off: slip, another battery, a robot that is not
-    as its file says, a link that loses.
-    """
-    scenario = ("scenario-1", "scenario-2", "scenario-3", "circle")[seed % 4]
-    law = LAWS[seed // 4 % 2]
-    overrides = list(_VARIANTS[seed // 8 % len(_VARIANTS)])
-    if scenario == "circle":
-        overrides.append("duration_s=20")
-    loaded = load_scenario(scenario, overrides)
-    record = execute_in_memory(RunSpec(loaded, "twin", "pose", law, "asg-ism", seed, Path()))
-    said = [record.manifest.outcome_detail, *record.diagnoses()]
-    told = "; ".join(text for text in said if text)
-    return f"{scenario} {law} seed {seed} {' '.join(overrides)}: {told}" if told else ""
-
-
-_VARIANTS = (
-    (),
-    ("robot.variant=slip",),
-    ("mismatch={mass_kg = 1.15, wheel_radius_m = 0.97}",),
-    ("link.loss_ratio=0.02",),
-)
