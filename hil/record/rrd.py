@@ -18,7 +18,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from hil.analysis import metrics
-from hil.core.files import replacing
+from hil.core.files import replace_file
 from hil.core.registries import OUTER_LAWS
 from hil.record.reader import RunRecord
 
@@ -102,14 +102,14 @@ _MAIN_PLOTS = ("error", "sliding", "wheels", "latency")
 
 def write_rrd(path: Path, runs: Sequence[RunRecord]) -> None:
     """Write the runs to one Rerun file, atomically; the first run's name titles the recording."""
-    names = entity_names(runs)
-    with replacing(path) as part:
-        _write_all(part, runs, names)
+    replace_file(path, _in_bytes(runs, entity_names(runs)))
 
 
-def _write_all(file: Path, runs: Sequence[RunRecord], names: Sequence[str]) -> None:
+def _in_bytes(runs: Sequence[RunRecord], names: Sequence[str]) -> bytes:
+    """Return the file's content: Rerun's own writer waits for ever once a file cannot be written."""
     recording = rr.RecordingStream(APPLICATION, recording_id=_recording_id(runs))
-    recording.save(file, default_blueprint=blueprint(runs, names))
+    memory = recording.memory_recording()
+    recording.send_blueprint(blueprint(runs, names), make_active=False)
     recording.send_recording_name(" and ".join(names))
     one_scenario = len({run.manifest.scenario_name for run in runs}) == 1
     legends = [f"{name.rpartition('/')[2] if one_scenario else name} " for name in names]
@@ -118,7 +118,7 @@ def _write_all(file: Path, runs: Sequence[RunRecord], names: Sequence[str]) -> N
         prefix, lines = ("", _LINE_COLOURS) if len(runs) == 1 else (legends[index], _shades(colour))
         _Sender(recording, name, run, colour).send(_LineStyle(prefix, lines))
     recording.flush()
-    recording.disconnect()
+    return bytes(memory.drain_as_bytes())
 
 
 def entity_names(runs: Sequence[RunRecord]) -> list[str]:
