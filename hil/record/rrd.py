@@ -20,6 +20,7 @@ import rerun.blueprint as rrb
 from hil.analysis import metrics
 from hil.core.files import replace_file
 from hil.core.registries import OUTER_LAWS
+from hil.core.text import visible
 from hil.record.reader import RunRecord
 
 if TYPE_CHECKING:
@@ -123,7 +124,7 @@ def _in_bytes(runs: Sequence[RunRecord], names: Sequence[str]) -> bytes:
 
 def entity_names(runs: Sequence[RunRecord]) -> list[str]:
     """Return a distinct entity name per run: scenario and law, numbered when they repeat."""
-    plain = [f"{run.manifest.scenario_name}/{run.manifest.outer}" for run in runs]
+    plain = [visible(f"{run.manifest.scenario_name}/{run.manifest.outer}") for run in runs]
     return [
         f"{name}-{plain[: index + 1].count(name)}" if plain.count(name) > 1 else name
         for index, name in enumerate(plain)
@@ -253,7 +254,7 @@ class _Sender:
     def _events(self) -> None:
         events = self._run.events
         time = [rr.TimeColumn(TIMELINE, duration=[max(event.t_s, 0.0) for event in events])]
-        text = [f"{event.t_s:.2f} s  {event.kind}: {event.text}" for event in events]
+        text = [visible(f"{event.t_s:.2f} s  {event.kind}: {event.text}") for event in events]
         level = ["WARN" if event.kind in _GRAVE else "INFO" for event in events]
         lines = rr.TextLog.columns(text=text, level=level)
         self._recording.send_columns(f"{self._name}/events", time, lines)
