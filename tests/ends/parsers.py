@@ -27,7 +27,6 @@ import numpy as np
 from hil.config.deck import load_deck
 from hil.config.load import load_robot, load_scenario
 from hil.core.errors import HilError
-from hil.record.export import export
 from hil.record.log_import import read_log
 from hil.record.log_mapping import LogMapping, read_mapping
 from hil.record.reader import read_run
@@ -36,7 +35,7 @@ from hil.record.tlog import read_tlog
 from hil.runs.execute import RunSpec, execute
 from hil.study.campaign.plan import load_campaign
 from hil.tools.board_parameters import read_file
-from tests.replay.topic_logs import dataflash, rows_of
+from tests.replay.topic_logs import KINDS, rows_of, write_log
 from vision.calibration.files import read_camera
 from vision.calibration.points import read_pairs
 from vision.cv_compat import read_image
@@ -44,7 +43,6 @@ from vision.cv_compat import read_image
 DATA = Path(str(files("hil") / "data"))
 # Reading a small file takes milliseconds; a damaged one may not take this much processor time, s.
 MOST_S = 5.0
-_MOST_BYTES = 400_000
 # What is put into text in place of a number or a word.
 _VALUES = (
     "nan", "inf", "-1", "0", "1e400", "9" * 400, "true", '""', "[]", "{}", "[[[[[[]]]]]]", "null",
@@ -75,7 +73,7 @@ def parsers(folder: Path) -> list[Parser]:
     """Return every kind of file; good ones come from a short run, which is made in `folder`."""
     scenario = load_scenario("scenario-1", ["duration_s=1"])
     run = folder / "run"
-    record = execute(RunSpec(scenario, "twin", "pose", "pid", "asg-ism", 1, run, rerun=False))
+    execute(RunSpec(scenario, "twin", "pose", "pid", "asg-ism", 1, run, rerun=False))
     found = [
         _text("scenario", "scenarios/scenario-1.toml", lambda path: load_scenario(str(path))),
         _text("robot", "robots/thesis-4wd.toml", lambda path: load_robot(str(path))),
@@ -85,14 +83,14 @@ def parsers(folder: Path) -> list[Parser]:
         Parser("parameters", b"[board]\nPID_KP = 0.2\nPWM_MAX = 1.0\n", "board.toml", read_file),
         Parser("mapping", _MAPPING, "mapping.toml", read_mapping),
         Parser("points", b"x_m,y_m,u_px,v_px\n0,0,320,240\n1,0,500,240\n", "pairs.csv", read_pairs),
-        Parser("DataFlash", b"".join(dataflash(rows_of(20))), "log.bin", _log),
+        Parser("log.csv", _CSV, "log.csv", _log(read_log_mapping(folder, _CSV_MAPPING))),
     ]
-    for form in ("csv", "mcap", "ulog"):
-        export(record, form, folder / f"log.{form}")
-        good = (folder / f"log.{form}").read_bytes()[:_MOST_BYTES]
-        found.append(Parser(f"log.{form}", good, f"log.{form}", _log))
+    for suffix in KINDS:
+        log = write_log(folder, suffix, rows_of(20))
+        mapping = read_mapping(log.with_suffix(".toml"))
+        found.append(Parser(log.name, log.read_bytes(), log.name, _log(mapping)))
     tlog = (run / "link.tlog").read_bytes()
-    found.append(Parser("log.tlog", tlog, "log.tlog", _log))
+    found.append(Parser("log.tlog", tlog, "log.tlog", _log(_own_mapping(folder))))
     found.append(Parser("link.tlog", tlog, "link.tlog", lambda path: list(read_tlog(path))))
     for name in ("manifest.json", "samples.parquet", "frames.parquet", "events.jsonl",
                  "inputs.tape"):  # fmt: skip
@@ -118,8 +116,40 @@ def _text(name: str, file: str, read: Callable[[Path], object]) -> Parser:
     return Parser(name, path.read_bytes(), path.name, read)
 
 
-def _log(path: Path) -> object:
-    return read_log(path, LogMapping())
+_CSV_MAPPING = """[columns]
+est_x_m = { column = "X_mm", scale = 0.001 }
+est_y_m = { column = "Y_mm", scale = 0.001 }
+est_theta_rad = { column = "heading_rad" }
+[t]
+column = "time_s"
+"""
+_CSV = b"time_s,X_mm,Y_mm,heading_rad,remark\n" + b"".join(
+    b"%.2f,%d,100,0.1,ok\n" % (0.05 * k, -500 + 12 * k) for k in range(40)
+)
+
+
+def read_log_mapping(folder: Path, text: str) -> LogMapping:
+    """Return a mapping as its file gives it."""
+    path = folder / "map.toml"
+    path.write_text(text)
+    return read_mapping(path)
+
+
+def _own_mapping(folder: Path) -> LogMapping:
+    """Return a mapping for the link's own messages, which have no pose: the wheels stand for it."""
+    lines = [
+        f'{name} = {{ message = "WHEEL_STATE", field = "{field}" }}'
+        for name, field in (
+            ("est_x_m", "omega_left_rad_s"),
+            ("est_y_m", "omega_right_rad_s"),
+            ("est_theta_rad", "left_counts"),
+        )
+    ]
+    return read_log_mapping(folder, "\n".join(["[columns]", *lines]) + "\n")
+
+
+def _log(settings: LogMapping) -> Callable[[Path], object]:
+    return lambda path: read_log(path, settings)
 
 
 def _in_record(run: Path, name: str) -> Callable[[Path], object]:
