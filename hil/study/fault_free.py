@@ -30,7 +30,9 @@ def drawn(seed: int) -> tuple[str, str, str, list[str]]:
         settings.append(f"link.latency_s={rng.uniform(0.005, 0.06):.4f}")
         settings.append(f"link.latency_jitter_s={rng.uniform(0.0, 0.03):.4f}")
     if rng.random() < 0.25:
+        # Single chunks: a burst that silences the link for 0.25 s is a fault, and stopped for that.
         settings.append(f"link.loss_ratio={rng.uniform(0.0, 0.02):.4f}")
+        settings.append("link.loss_burst_chunks=1")
     if rng.random() < 0.25:
         settings.append("robot.variant=slip")
     if rng.random() < 0.5:

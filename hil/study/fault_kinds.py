@@ -17,6 +17,7 @@ INSTANTS = {
 CLOSING = "closing"
 # What two faults of the wheels may both be told as; each row takes as few of them as its evidence allows.
 _APART = "camera and wheels disagree"
+_SILENT = "no heartbeat"  # of a board that is not there when the host connects
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,16 +83,16 @@ ROWS = (
     FaultRow("battery sags to 9 V", named="BATTERY", loads=(("battery_sag_v", 3.5),)),
     FaultRow("battery sags for 0.5 s", named="BATTERY", loads=(("battery_sag_v", 3.5),),
              pulses_s=((0.0, 0.5),)),
-    FaultRow("brown-out, board resets", "board_reset", named="started anew|link:",
+    FaultRow("brown-out, board resets", "board_reset", named=f"started anew|link:|{_SILENT}",
              loads=(("battery_sag_v", 9.0),), pulses_s=_SHORT),
-    FaultRow("board reset", "board_reset", named="started anew|link:", pulses_s=((0.0, 0.3),)),
-    FaultRow("board gone", "board_reset", named="link:"),
-    FaultRow("link cut", "link_cut", named="link:|SETPOINT_TIMEOUT"),
-    FaultRow("link cut for 0.2 s", "link_cut", named="link:|SETPOINT_TIMEOUT", pulses_s=_SHORT),
-    FaultRow("link half open: board deaf", "link_down_cut", named="SETPOINT_TIMEOUT|board:"),
-    FaultRow("link half open: host deaf", "link_up_cut", named="link:|board:"),
-    FaultRow("link doubles all", "link_duplicated", named="link:|board:"),
-    FaultRow("link reorders all", "link_reordered", named="link:|board:"),
+    FaultRow("board reset", "board_reset", named=f"started anew|link:|{_SILENT}", pulses_s=((0.0, 0.3),)),
+    FaultRow("board gone", "board_reset", named=f"link:|{_SILENT}"),
+    FaultRow("link cut", "link_cut", named=f"link:|SETPOINT_TIMEOUT|{_SILENT}"),
+    FaultRow("link cut for 0.2 s", "link_cut", named=f"link:|SETPOINT_TIMEOUT|{_SILENT}", pulses_s=_SHORT),
+    FaultRow("link half open: board deaf", "link_down_cut", named=f"SETPOINT_TIMEOUT|{_SILENT}|no answer"),
+    FaultRow("link half open: host deaf", "link_up_cut", named=f"link:|{_SILENT}"),
+    FaultRow("link doubles all", "link_duplicated", named=f"link:|SETPOINT_TIMEOUT|{_SILENT}"),
+    FaultRow("link reorders all", "link_reordered", named=f"link:|SETPOINT_TIMEOUT|{_SILENT}"),
     FaultRow("link loses a fifth", named="link:|board:", settings=("link.loss_ratio=0.2",)),
     FaultRow("link loses bursts", named="link:|board:",
              settings=("link.loss_ratio=0.1", "link.loss_burst_chunks=8")),

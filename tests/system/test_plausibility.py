@@ -179,7 +179,15 @@ def test_runs_without_a_fault_are_left_alone(seed: int) -> None:
 
 @pytest.mark.parametrize(
     ("name", "instant"),
-    [("frames repeated", "at speed"), ("link cut", "closing"), ("encoder dead", "before arming")],
+    [
+        ("frames repeated", "at speed"),
+        ("link cut", "closing"),
+        ("encoder dead", "before arming"),
+        ("host stopped for 1 s", "at speed"),
+        ("host's clock steps by -5 s", "at start"),
+        ("brown-out, board resets", "at speed"),
+        ("colours exchanged", "at speed"),
+    ],
 )
 def test_cells_of_the_matrix(name: str, instant: str) -> None:
     """A short form of `hil faults`; at speed the record is replayed too."""
