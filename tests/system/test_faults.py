@@ -50,7 +50,6 @@ def test_board_finds_the_fault_and_names_it(
         ("camera_occluded", "camera", 0.7),
         ("link_cut", "link", 0.5),
         ("link_up_cut", "link", 0.5),
-        ("gear_slip", "camera and wheels disagree", 0.7),
         ("host_clock_step", "host: 5.0", 0.0),
         ("board_reset", "link", 0.5),
     ],

@@ -196,10 +196,10 @@ def test_the_world_goes_on_while_the_host_does_not() -> None:
     drive = armed(faults=(one("host_stopped"),))
     begin_s = drive.twin.now_s()
     drive.run(0.5, 5.0, 5.0)
-    drive.twin.wait(drive.twin.now_s() + 0.02)
-    assert drive.twin.now_s() == pytest.approx(begin_s + 1.5, abs=0.01)
-    reports = drive.link.poll(drive.twin.now_s())
-    assert len(reports) == pytest.approx(50, abs=2)
+    drive.run(0.1, 5.0, 5.0)
+    assert drive.twin.now_s() > begin_s + 1.5
+    waited = [report for report in drive.reports if report.t_arrival_s > begin_s + 1.4]
+    assert len(waited) == pytest.approx(54, abs=6)
     assert drive.link.state_name == "SAFE (SETPOINT_TIMEOUT)"
 
 
