@@ -29,6 +29,10 @@ _BOARD_WAITS_S = 0.25
 _DISAGREE_WHY = "marks exchanged, picture mirrored, or the robot pushed or held?"
 
 
+class Disagreement(RigFault):
+    """Camera and wheels say different things of the robot's motion."""
+
+
 class Supervisor:
     """Judges one run by its safety limits; each check raises RigFault when the robot has to stop."""
 
@@ -96,7 +100,7 @@ class Supervisor:
         duration = f"for {lost_s:.2f} s (limit {limit_s:g} s)"
         if self._refused >= _REFUSED_POSES:
             x_m, y_m, turn_rad = self._estimator.refused
-            raise RigFault(
+            raise Disagreement(
                 f"camera and wheels disagree: robot not seen where the wheels take it {duration}: "
                 f"{self._refused} poses refused, the last one {math.hypot(x_m, y_m):.3f} m and "
                 f"{math.degrees(turn_rad):.0f} deg off; {_DISAGREE_WHY}"
@@ -108,7 +112,7 @@ class Supervisor:
         """Raise RigFault when poses are believed only because the wheels no longer count."""
         for seen, unit in zip(self._estimator.scales, ("m", "rad"), strict=True):
             if not _LEAST_SCALE <= seen <= _MOST_SCALE:
-                raise RigFault(
+                raise Disagreement(
                     f"camera and wheels disagree: {seen:.2f} {unit} seen for each {unit} that the "
                     f"wheels turn (limits {_LEAST_SCALE:g} to {_MOST_SCALE:g} {unit}); "
                     f"{_DISAGREE_WHY}"

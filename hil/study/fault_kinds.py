@@ -101,7 +101,7 @@ ROWS = (
     FaultRow("camera stalls", "camera_stall", named="camera:"),
     FaultRow("camera stalls for 0.4 s", "camera_stall", named="camera:", pulses_s=((0.0, 0.4),)),
     FaultRow("robot hidden", "camera_occluded", named="camera:"),
-    FaultRow("frames repeated", "camera_repeated", named="frames repeated|camera:"),
+    FaultRow("frames repeated", "camera_repeated", named="frames repeated"),
     FaultRow("camera's clock steps by 5 s", "camera_clock_step", named="camera:"),
     FaultRow("camera's clock steps by -5 s", "camera_clock_step", named="camera:",
              fields=", step_s = -5"),
