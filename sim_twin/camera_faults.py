@@ -71,7 +71,8 @@ class FaultyMaker:
 
     def _disturbed(self, fault: Fault, image: NDArray[np.uint8], index: int) -> NDArray[np.uint8]:
         if fault.kind == "camera_exposure":
-            return np.clip(image * fault.light_ratio, 0.0, 255.0).astype(np.uint8)
+            lit: NDArray[np.uint8] = np.clip(image * fault.light_ratio, 0.0, 255.0).astype(np.uint8)
+            return lit
         if fault.kind == "camera_colours":
             return np.ascontiguousarray(image[:, :, ::-1])
         if fault.kind == "camera_second_robot":
