@@ -27,7 +27,7 @@ class FaultRow:
     `pulses_s` are (start, end) after the instant, end None for ever. `fields` are further ones of the
     fault. `loads` are disturbances of the same times, each (target, amplitude). `settings` are in force
     from the begin to the end of a run, whatever the instant. A `slow` one is told and stops nothing,
-    unless the wheel stands: then it is a stall.
+    unless the wheel stands: then it is a stall. No fault begins before `first_s`.
     """
 
     name: str
@@ -40,9 +40,11 @@ class FaultRow:
     fields: str = ""
     loads: tuple[tuple[str, float], ...] = ()
     camera: str = "pose"
+    first_s: float = 0.0
 
     def overrides(self, start_s: float) -> list[str]:
         """Return the settings of a run with this fault from `start_s` on."""
+        start_s = max(start_s, self.first_s)
         return [
             *self._events("faults", [f'kind = "{self.kind}", side = "{self.side}"{self.fields}'] if
                           self.kind else [], start_s),
@@ -113,7 +115,8 @@ ROWS = (
     FaultRow("front mark covered", "camera_mark_covered", named="camera:", camera="rendered"),
     FaultRow("second robot", "camera_second_robot", named="camera", camera="rendered",
              fields=", x_m = -0.3, y_m = 0.55"),
-    FaultRow("host stopped for 1 s", "host_stopped", named="host:", pulses_s=((0.0, 1.0),)),
+    FaultRow("host stopped for 1 s", "host_stopped", named="host:", pulses_s=((0.0, 1.0),),
+             first_s=0.01),  # there is no run of a host that does not run
     FaultRow("host overloaded", "host_overloaded", named="host:|link:|SETPOINT_TIMEOUT"),
     FaultRow("host's clock steps by 5 s", "host_clock_step", named="host:"),
     FaultRow("host's clock steps by -5 s", "host_clock_step", named="host:",
