@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import multiprocessing
 from collections.abc import Callable, Iterable, Sequence
@@ -11,7 +12,7 @@ from typing import Any
 
 from hil.core.errors import BadInput
 from hil.study.fault_free import MOST_RATIO, fault_free, most_ratio
-from hil.study.fault_matrix import Cell, run_cell
+from hil.study.fault_matrix import Cell, cells, run_cell
 
 CELLS, FAULT_FREE = "cells.jsonl", "fault_free.jsonl"
 Key = tuple[str, str, str]
@@ -40,6 +41,18 @@ def run_matrix(
             done[(cell.fault, cell.instant, cell.law)] = tree
             progress(len(done), len(keys))
     return [done[key] for key in keys]
+
+
+def finished(folder: Path, seed: int) -> list[Key]:
+    """Return the cells of the matrix that a folder has, in their order."""
+    done = _done(folder / CELLS, seed)
+    return [key for key in cells() if key in done]
+
+
+def finished_free(folder: Path, seed: int) -> list[int]:
+    """Return the seeds of the runs without a fault that a folder has, from `seed` on without a gap."""
+    done = {int(tree["seed"]) for tree in _lines(folder / FAULT_FREE, ("seed", "said"))}
+    return list(itertools.takewhile(done.__contains__, itertools.count(seed)))
 
 
 def run_fault_free(
