@@ -57,13 +57,12 @@ def visible_lines(lines: Sequence[str]) -> str:
 
 def _row(name: str, found: Sequence[Cell]) -> str:
     at_speed = {cell["law"]: cell for cell in found if cell["instant"] == "at speed"}
-    detected = " / ".join(_seconds(at_speed[law]["detected_s"]) for law in LAWS)
-    said = at_speed[LAWS[-1]]["said"]
-    worst = [
-        f"{max(cell[key] for cell in found):.2f}" for key in ("rest_s", "peak_m_s", "travel_m")
-    ]
+    detected = " / ".join(_seconds(at_speed[law]["detected_s"]) for law in LAWS if law in at_speed)
+    told = _short(at_speed[LAWS[-1]]["said"]) or "recovered" if LAWS[-1] in at_speed else "not run"
+    keys = ("rest_s", "peak_m_s", "travel_m")
+    worst = [f"{max((cell[key] for cell in found), default=0.0):.2f}" for key in keys]
     met = f"{sum(cell['met'] for cell in found)} of {len(found)}"
-    return f"| {' | '.join([name, detected, *worst, met, _short(said) or 'recovered'])} |"
+    return f"| {' | '.join([name, detected, *worst, met, told])} |"
 
 
 def _seconds(value: float | None) -> str:
