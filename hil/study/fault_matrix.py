@@ -20,7 +20,7 @@ from hil.config.load import load_scenario
 from hil.core.errors import HilError
 from hil.core.types import wrap_pi
 from hil.replays.exact import replay
-from hil.rigs.opening import frame_maker, twin_setup
+from hil.rigs.opening import open_rig
 from hil.runs.execute import RunSpec, execute, execute_in_memory
 from hil.study.fault_kinds import CLOSING, INSTANTS, ROWS, FaultRow
 from sim_twin.twin import Twin
@@ -159,7 +159,8 @@ def run_cell(fault: str, instant: str, law: str, seed: int = 1) -> Cell:
         spec = RunSpec(
             scenario, "twin", row.camera, law, "asg-ism", seed, Path(folder) / "run", rerun=False
         )
-        twin = Twin(twin_setup(scenario, seed), frame_maker(scenario, row.camera, seed))
+        twin = open_rig("twin", scenario, row.camera, seed)
+        assert isinstance(twin, Twin)
         rig = WatchedRig(twin)
         flaws: list[str] = []
         if instant == "at speed":
