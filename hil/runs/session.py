@@ -17,7 +17,7 @@ from hil.core.registry import in_one_line
 from hil.core.types import PoseMeasurement
 from hil.record.tick_rows import sample_row
 from hil.runs.plausibility import DIAGNOSIS, Plausibility
-from hil.runs.supervision import Supervisor
+from hil.runs.supervision import Disagreement, Supervisor
 from hil.runs.wheel_limits import WheelLimits
 from hil.wire import handshake
 from hil.wire.refusal import refused_set_point
@@ -279,6 +279,7 @@ class Session:
         waited = False
         while True:
             now_s = rig.now_s()
+            self._supervisor.check_clock(now_s)
             self._take_all(now_s)
             if now_s >= until_s:
                 break
@@ -358,7 +359,11 @@ class Session:
         if self._refusal:
             raise RigFault(f"board: {self._refusal}")
         link = self._parts.link
-        self._supervisor.check(now_s, link, self._report)
+        self._supervisor.check_host(now_s)
+        try:
+            self._supervisor.check(now_s, link, self._report)
+        except Disagreement as fault:
+            raise self._plausibility.narrowed(fault) from None
         if self._report is not None:
             self._plausibility.check(now_s, self._report, link.info.pwm_top_counts)
 
