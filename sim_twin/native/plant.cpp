@@ -10,6 +10,13 @@ constexpr double kGravity = 9.81;  // m/s^2
 // Slope of a brake's torque through rest, as stiff as a jam of the gears (kernel.cpp).
 constexpr double kStiffest_n_m_s_rad = 12.0;
 
+// What is left of a speed or a current that dies away: far below anything that acts on the rest, and
+// still far above the numbers that processors take a hundred times longer for, squared too. Without an
+// end a robot at rest would be computed in those for ever.
+constexpr double kNothing = 1e-100;
+
+inline Pair settled(Pair v) { return magnitude(v) < kNothing ? Pair{0.0, 0.0} : v; }
+
 // Sign with a soft middle: 0.71 at v = v_s, 0.995 at 10 v_s.
 inline Pair soft_sign(Pair v, double v_s) { return v / root(v * v + v_s * v_s); }
 
@@ -287,6 +294,8 @@ void Plant::step(double h_s, const Drive& drive, const LoadVector& begin,
     next[kEta][1] = -p_.d0_m * next[kTurn][1];
     next[kOmega] = rolling(next[kEta][0], next[kTurn][1]);
   }
+  next[kTurn][1] = std::fabs(next[kTurn][1]) < kNothing ? 0.0 : next[kTurn][1];
+  for (const int i : {kEta, kCurrent, kOmega}) next[i] = settled(next[i]);
   x_ = listed(next);
 }
 

@@ -131,6 +131,23 @@ def test_a_coasting_robot_comes_to_rest_and_stays_there():
     assert abs(later["theta_rad"] - rest["theta_rad"]) < 1e-4
 
 
+def test_a_robot_at_rest_is_exactly_at_rest():
+    """No speed or current dies away for ever: each ends at 0 and never is a number too small to be normal."""
+    for variant in ("constrained", "slip"):
+        model = plant(robot(variant=variant))
+        moving(model, eta1_m_s=0.5, theta_dot_rad_s=1.0)
+        settle(model, 0.4, -0.2, seconds=0.2)
+        seen = set()
+        for _ in range(400):
+            now = settle(model, 0.0, 0.0, seconds=0.01)
+            speeds = [now[name] for name in ("eta1_m_s", "theta_dot_rad_s", "omega_left_rad_s")]
+            speeds += [now["current_left_a"], now["current_right_a"], now["eta2_m_s"]]
+            assert all(v == 0.0 or abs(v) > 1e-200 for v in speeds)
+            seen.update(v for v in speeds if 0.0 < abs(v) < 1e-50)
+        assert speeds == [0.0] * 6
+        assert seen  # it died away through small numbers, and was not cut off where it matters
+
+
 def test_scrub_resists_turning_with_the_moment_of_the_model():
     """M_r = 2 mu a_f b m g / (a_f + b) = 0.824 N m on (I + m d0^2 + rims W^2/2) = 0.0475 kg m^2."""
     model = plant(ideal_robot(floor_friction_ratio=0.4, **UNPLUGGED))
