@@ -42,9 +42,14 @@ class Plant:
     def step(self, h_s: float, duty_left: float, duty_right: float, loads: Sequence[float]) -> None:
         """Take one RK4 step with duty (-1..1) and loads (in the order of LOADS) held."""
     def run(
-        self, steps: int, h_s: float, duty_left: float, duty_right: float, loads: Sequence[float]
+        self,
+        steps: int,
+        h_s: float,
+        duty_left: float,
+        duty_right: float,
+        loads: Sequence[float] | None,
     ) -> None:
-        """Take many such steps."""
+        """Take many such steps; without loads a robot that stands costs a twentieth, same bits."""
     def derivative(
         self, duty_left: float, duty_right: float, loads: Sequence[float]
     ) -> list[float]:

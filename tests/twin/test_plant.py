@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 
 import pytest
 from hypothesis import given, settings
@@ -146,6 +147,24 @@ def test_a_robot_at_rest_is_exactly_at_rest():
             seen.update(v for v in speeds if 0.0 < abs(v) < 1e-50)
         assert speeds == [0.0] * 6
         assert seen  # it died away through small numbers, and was not cut off where it matters
+
+
+@pytest.mark.parametrize("variant", ["constrained", "slip", "lifted"])
+def test_a_robot_that_stands_is_reckoned_shorter_with_the_same_bits(variant):
+    """Driving, coasting and standing by turns: with and without the short way the state is one."""
+    full, short = plant(robot(variant=variant)), plant(robot(variant=variant))
+    rng = random.Random(variant)
+    stood = 0
+    for _ in range(40):
+        duty = (0.0, 0.0) if rng.random() < 0.6 else (rng.uniform(-1, 1), rng.uniform(-1, 1))
+        steps = rng.randrange(1, 4000)
+        for model, load in ((full, NO_LOADS), (short, None)):
+            model.run(steps, 1e-4, *duty, load)
+        bits = [[value.hex() for value in model.state] for model in (full, short)]
+        assert bits[0] == bits[1]
+        stood += named(full.state)["omega_left_rad_s"] == 0.0
+    assert 3 < stood < 40
+    assert named(full.state)["charge_ratio"] < 0.7
 
 
 def test_scrub_resists_turning_with_the_moment_of_the_model():
