@@ -19,6 +19,7 @@ namespace nb = nanobind;
 using namespace nb::literals;
 
 void bind_render(nb::module_& m);  // render_bind.cpp
+void bind_rig(nb::module_& m);     // rig_bind.cpp
 
 namespace {
 
@@ -230,4 +231,5 @@ NB_MODULE(_native, m) {
   bind_plant(m);
   bind_kernel(m);
   bind_render(m);
+  bind_rig(m);
 }
