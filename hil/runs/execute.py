@@ -45,9 +45,10 @@ if TYPE_CHECKING:
     from hil.config.scenario import Scenario
     from hil.core.registry import Entry
     from hil.core.rig import Rig
-    from hil.core.types import OuterLaw
+    from hil.core.types import OuterLaw, Pose, PoseMeasurement
     from hil.record.memory import RunSink
     from hil.record.reader import RunRecord
+    from vision.tracker import Image, Localiser
 
 # Value of the board's parameter LAW for each wheel law.
 INNER_LAWS = {"asg-ism": 0.0, "pid": 1.0}
@@ -258,7 +259,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
         rig=rig,
         link=BoardLink(rig.stream, timeline.link_frame),
         camera_clock=CameraClock(scenario.camera.latency_s),
-        localiser=make_localiser(scenario.camera),
+        localiser=_localiser_of(spec),
         estimator=make_estimator(control.estimator, control, vehicle.geometry),
         law=WithinWheelSpeed(law or make_law(spec), vehicle, wheel_speed_max_rad_s(scenario)),
         reference=make_reference(scenario.reference),
@@ -267,6 +268,23 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
         timeline=timeline,
         own_terms=tuple(OUTER_LAWS.get(spec.outer).trace),
     )
+
+
+class _NoImages:
+    """The localiser of a run whose frames bring their poses: it is never asked."""
+
+    def locate(
+        self, image_bgr: Image, predicted: Pose | None, search_radius_m: float  # noqa: ARG002
+    ) -> PoseMeasurement:
+        """Refuse: there is no image to look at."""
+        raise AssertionError("an image came in a run without images")
+
+
+def _localiser_of(spec: RunSpec) -> Localiser:
+    """Return the localiser of a run; where poses are drawn its projections need not be worked out."""
+    if spec.target in SIMULATED and spec.camera == "pose":
+        return _NoImages()
+    return make_localiser(spec.scenario.camera)
 
 
 def make_manifest(spec: RunSpec) -> Manifest:
