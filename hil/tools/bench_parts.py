@@ -19,7 +19,7 @@ from hil.record.schema import SAMPLE_NAMES
 from hil.report.compare import compare_runs
 from hil.report.html import render
 from hil.runs.execute import RunSpec, execute
-from hil.tools.bench import Figure, measure
+from hil.tools.bench import Figure, Plan, measure
 from hil.wire import dialect
 from hil.wire.framing import FrameReader
 
@@ -37,7 +37,7 @@ def figures(runs: int) -> list[Figure]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         record = _record(folder / "run")
-        plans: list[tuple[str, str, str, Callable[[], float]]] = [
+        plans: list[Plan] = [
             ("estimator, one tick", "us", "<= 500", estimator_tick_us),
             ("recorder, one row", "us", "<= 20", lambda: recorder_row_us(folder)),
             ("link, one WHEEL_STATE", "us", "", frame_us),
