@@ -45,10 +45,10 @@ if TYPE_CHECKING:
     from hil.config.scenario import Scenario
     from hil.core.registry import Entry
     from hil.core.rig import Rig
-    from hil.core.types import OuterLaw, Pose, PoseMeasurement
+    from hil.core.types import OuterLaw, PoseMeasurement
     from hil.record.memory import RunSink
     from hil.record.reader import RunRecord
-    from vision.tracker import Image, Localiser
+    from vision.tracker import Localiser
 
 # Value of the board's parameter LAW for each wheel law.
 INNER_LAWS = {"asg-ism": 0.0, "pid": 1.0}
@@ -273,9 +273,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
 class _NoImages:
     """The localiser of a run whose frames bring their poses: it is never asked."""
 
-    def locate(
-        self, image_bgr: Image, predicted: Pose | None, search_radius_m: float  # noqa: ARG002
-    ) -> PoseMeasurement:
+    def locate(self, *_looked_at: object) -> PoseMeasurement:
         """Refuse: there is no image to look at."""
         raise AssertionError("an image came in a run without images")
 

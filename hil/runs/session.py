@@ -300,7 +300,7 @@ class Session:
             self._report = report
             self._parts.estimator.on_wheels(report.sample)
             round_trip_s = report.round_trip_s
-            if round_trip_s == round_trip_s:
+            if not math.isnan(round_trip_s):
                 self._uplink_s += _UPLINK_GAIN * (0.5 * round_trip_s - self._uplink_s)
         poll_frame = self._parts.rig.poll_frame
         while (frame := poll_frame()) is not None:

@@ -168,9 +168,7 @@ def kernel_us_a_s(moved: bool) -> float:
     """
     from hil.config.events import Disturbance  # noqa: PLC0415 - for this figure only
 
-    pushes = (
-        [Disturbance(target="force_forward_n", shape="step", amplitude=8.0)] if moved else []
-    )
+    pushes = [Disturbance(target="force_forward_n", shape="step", amplitude=8.0)] if moved else []
     kernel = make_kernel(load_scenario("scenario-1").robot, UART_BAUD, Random(1), pushes)
     kernel.begin(0)
     end_us = _STEPS * STEP_US
