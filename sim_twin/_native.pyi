@@ -358,6 +358,8 @@ class Renderer:
     """Draws frames of one scene from one view."""
 
     def __init__(self, view: View, scene: Scene, robot: Robot, seed: int) -> None: ...
+    def reseeded(self, seed: int) -> Renderer:
+        """Return the same scene with the noise of another seed."""
     def make(self, index: int, poses: Sequence[tuple[float, float, float]]) -> NDArray[np.uint8]:
         """Return frame `index`, (height, width, 3) BGR; no poses: the empty scene."""
 

@@ -114,6 +114,11 @@ Renderer::Renderer(const View& view, const Scene& scene, const Robot& robot, uin
     background();
 }
 
+Renderer::Renderer(const Renderer& other, uint64_t seed) : Renderer(other) {
+    seed_ = seed;
+    noise_bank();
+}
+
 // What an edge between any two ids is.
 void Renderer::edge_table() {
     constexpr float FAINT = 0.15f;  // reflectance, the three colours together: 10 DN each

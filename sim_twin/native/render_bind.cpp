@@ -68,6 +68,8 @@ struct Bound {
     Bound(const camera::View& v, const camera::Scene& s, const camera::Robot& r, uint64_t seed)
         : view(checked(v, s)), renderer(v, s, r, seed) {}
 
+    Bound(const Bound& other, uint64_t seed) : view(other.view), renderer(other.renderer, seed) {}
+
     static const camera::View& checked(const camera::View& v, const camera::Scene& s) {
         const size_t pixels = static_cast<size_t>(v.width) * v.height;
         if (v.width < 2 || v.height < 2 || s.light.size() != pixels || s.glare.size() != pixels)
@@ -160,6 +162,9 @@ void bind_render(nb::module_& m) {
     nb::class_<Bound>(m, "Renderer")
         .def(nb::init<const View&, const Scene&, const Robot&, uint64_t>(), nb::arg("view"),
              nb::arg("scene"), nb::arg("robot"), nb::arg("seed"))
+        .def("reseeded", [](const Bound& bound, uint64_t seed) { return new Bound(bound, seed); },
+             nb::rv_policy::take_ownership, nb::arg("seed"),
+             "The same scene with the noise of another seed.")
         .def("make", &Bound::make, nb::arg("index"), nb::arg("poses"),
              "The frame `index`, (height, width, 3) BGR, with the robot at `poses` (x, y, theta)\n"
              "from the start to the end of the exposure; without poses the empty scene.");
