@@ -10,7 +10,7 @@ import click
 from hil.cli.options import json_option, print_json
 
 if TYPE_CHECKING:
-    from hil.tools.bench import Figure
+    from hil.analysis.speed import Figure
 
 
 # What is measured in medians of several runs, and can be compared with another revision's.
@@ -110,13 +110,14 @@ def _measured(what: str, runs: int) -> list[Figure]:
         from hil.tools import bench_parts
 
         return bench_parts.figures(runs)
+    from hil.study.campaign import speed
     from hil.tools import bench_runs
 
     plans = {
         "batch": bench_runs.batch_figures,
         "law": bench_runs.law_figures,
-        "campaign": bench_runs.campaign_figures,
-        "report": bench_runs.report_figures,
+        "campaign": speed.campaign_figures,
+        "report": speed.report_figures,
     }
     return plans[what](runs)
 

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import os
 import platform
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from hil import __version__
+from hil.analysis.speed import Figure, Plan, measure
 from hil.config.link import UART_BAUD
 from hil.config.load import load_scenario
 from hil.record.manifest import collect_versions, git_revision
@@ -26,40 +25,6 @@ from sim_twin.pil import pil_is_missing
 
 _SCENARIO = "scenario-1"
 FORMAT = "hil-bench-1"
-
-
-# Name, unit, goal, and what gives one value.
-Plan = tuple[str, str, str, Callable[[], float]]
-
-
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """One speed figure: median, least and largest of `runs` runs; `goal` is what it should reach.
-
-    `values` are all that was measured, in ascending order.
-    """
-
-    name: str
-    unit: str
-    median: float
-    least: float
-    largest: float
-    runs: int
-    goal: str
-    values: tuple[float, ...]
-
-    @classmethod
-    def of(cls, name: str, unit: str, values: Sequence[float], goal: str) -> Figure:
-        """Return the figure of measured values."""
-        found = tuple(sorted(values))
-        middle = statistics.median(found)
-        return cls(name, unit, middle, found[0], found[-1], len(found), goal, found)
-
-
-def measure(name: str, unit: str, goal: str, runs: int, once: Callable[[], float]) -> Figure:
-    """Return the figure of `once`, called `runs` times after one call that is not counted."""
-    once()
-    return Figure.of(name, unit, [once() for _ in range(runs)], goal)
 
 
 def real_time_factor(camera: str, *, target: str = "twin", record: bool = True) -> float:

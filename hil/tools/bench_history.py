@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from hil.analysis.speed import Figure
 from hil.core.errors import BadInput
-from hil.tools.bench import FORMAT, Figure
+from hil.tools.bench import FORMAT
 
 _RESAMPLES = 4000
 _TAIL = 2.5  # %, on each side of an interval of 95 %

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hil.analysis.speed import Figure, Plan, measure
 from hil.config.load import load_scenario
 from hil.control.estimators.geometry import BelievedGeometry
 from hil.control.estimators.making import make_estimator
@@ -19,7 +20,6 @@ from hil.record.schema import SAMPLE_NAMES
 from hil.report.compare import compare_runs
 from hil.report.html import render
 from hil.runs.execute import RunSpec, execute
-from hil.tools.bench import Figure, Plan, measure
 from hil.wire import dialect
 from hil.wire.framing import FrameReader
 

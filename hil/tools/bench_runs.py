@@ -1,13 +1,10 @@
-"""How many runs a core makes: built-in laws, an own law in Python, a campaign, a campaign's report.
+"""How many runs a core makes: along each path, with built-in laws and with an own one in Python.
 
-`batch` and `law` count the processor time of one core, so that others on the machine disturb them
-least; `campaign` and `report` count the time on the wall, workers and their start included.
+Processor time of one core is counted, so that others on the machine disturb the figures least.
 """
 
 from __future__ import annotations
 
-import math
-import os
 import tempfile
 import time
 from collections.abc import Callable
@@ -16,17 +13,12 @@ from pathlib import Path
 from random import Random
 from typing import TYPE_CHECKING
 
+from hil.analysis.speed import Figure, Plan, measure
 from hil.config.link import UART_BAUD
 from hil.config.load import load_scenario
 from hil.core.registries import OUTER_LAWS
 from hil.rigs.opening import open_rig
 from hil.runs.execute import RunSpec, execute_in_memory
-from hil.study.campaign.findings import outcomes_of
-from hil.study.campaign.maps import write_page
-from hil.study.campaign.plan import Campaign, load_campaign
-from hil.study.campaign.results import row_of, schema_of
-from hil.study.campaign.work import run_campaign
-from hil.tools.bench import Figure, Plan, measure
 from sim_twin.setup import STEP_US, make_kernel
 
 if TYPE_CHECKING:
@@ -34,9 +26,6 @@ if TYPE_CHECKING:
 
 _X = "x real time"
 _STEPS = 20_000
-# Of the built-in campaign `limits`: so many runs, evenly over its conditions, are what is timed.
-_CAMPAIGN_RUNS = 40
-_REPORT_ROWS = 10_000
 _DRIVING = (0.5, 0.3)  # duties of the plant alone
 
 
@@ -76,61 +65,6 @@ def law_figures(runs: int) -> list[Figure]:
             for what, law in (("an own law in Python", own), ("asg-ism", "asg-ism"), ("pid", "pid"))
         ]
         return [measure(name, unit, goal, runs, once) for name, unit, goal, once in plans]
-
-
-def campaign_figures(runs: int) -> list[Figure]:
-    """Return runs a second of a campaign on all cores, and how much of the workers' time runs take."""
-    campaign = _thinned(load_campaign("limits"))
-    shares: list[float] = []
-
-    def once() -> float:
-        with tempfile.TemporaryDirectory() as folder:
-            _, totals = run_campaign(campaign, Path(folder) / "sweep", os.cpu_count())
-        shares.append(totals.efficiency or math.nan)
-        return totals.runs_now / totals.wall_s
-
-    rate = measure(f"campaign of {len(campaign.jobs())} runs", "runs/s", "", runs, once)
-    values = tuple(shares[1:])  # the first call is not counted
-    return [rate, Figure.of("workers' time spent on runs", "ratio", values, "")]
-
-
-def report_figures(runs: int) -> list[Figure]:
-    """Return the time of a campaign's answers and page from results of many rows."""
-    import pyarrow as pa  # noqa: PLC0415 - for this figure only
-
-    campaign = load_campaign("limits")
-    rng = Random(1)
-    names = schema_of(campaign).names
-    figures = [name for name in names if name in {"iae_m_s", "delta1_worst_last_second_m"}]
-    rows = [
-        row_of(job, "complete", "", True, 10.0, [(name, rng.random()) for name in figures])
-        for job in campaign.jobs()[:_REPORT_ROWS]
-    ]
-    table = pa.Table.from_pylist(rows, schema_of(campaign))
-
-    def once() -> float:
-        start_s = time.perf_counter()
-        with tempfile.TemporaryDirectory() as folder:
-            write_page(Path(folder) / "page.html", outcomes_of(campaign, table), "hil bench report")
-        return time.perf_counter() - start_s
-
-    return [measure(f"campaign's page from {len(rows)} rows", "s", "", runs, once)]
-
-
-def _thinned(campaign: Campaign) -> Campaign:
-    """Return the campaign with its first seeds only, so that about _CAMPAIGN_RUNS runs are left."""
-    file = campaign.file
-    first = {axis: [values[0], values[-1]] for axis, values in _lists(campaign).items()}
-    combinations = 2 ** len(first) * len(file.outer) * len(file.inner)
-    seeds = max(1, round(_CAMPAIGN_RUNS / combinations))
-    return Campaign(file.model_copy(update={"grid": first, "seeds": seeds}), campaign.base)
-
-
-def _lists(campaign: Campaign) -> dict[str, list[float]]:
-    return {
-        axis: sorted({float(point[axis]) for point in campaign.grid_points()})
-        for axis in campaign.file.grid
-    }
 
 
 def _simulated(scenario: Scenario, camera: str, outer: str) -> float:

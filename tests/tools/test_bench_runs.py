@@ -7,8 +7,10 @@ import math
 
 import pytest
 
+from hil.analysis.speed import Figure
+from hil.study.campaign import speed
 from hil.tools import bench_history, bench_runs
-from hil.tools.bench import FORMAT, Figure, as_document
+from hil.tools.bench import FORMAT, as_document
 from tests.cli.command import hil
 
 
@@ -59,13 +61,30 @@ def test_the_simulated_time_of_a_run_is_that_of_its_rig() -> None:
 
 def test_the_campaign_is_the_built_in_one_with_fewer_runs() -> None:
     """Both ends of every axis and every law are in it."""
-    campaign = bench_runs._thinned(bench_runs.load_campaign("limits"))
+    campaign = speed._thinned(speed.load_campaign("limits"))
     jobs = campaign.jobs()
-    assert 16 <= len(jobs) <= 2 * bench_runs._CAMPAIGN_RUNS
+    assert 16 <= len(jobs) <= 2 * speed._CAMPAIGN_RUNS
     for axis, ends in campaign.file.grid.items():
         assert {dict(job.point)[axis] for job in jobs} == set(ends)
         assert len(ends) == 2
     assert {job.outer for job in jobs} == set(campaign.file.outer)
+
+
+def test_a_campaign_is_timed_with_its_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two runs of one second on real workers: a rate, and the share of the workers' time."""
+    monkeypatch.setattr(speed, "_thinned", lambda campaign: _two_runs(campaign))
+    done = hil("bench", "campaign", "--runs", 1, "--json")
+    rate, share = done.json["figures"]
+    assert (rate["name"], rate["unit"]) == ("campaign of 2 runs", "runs/s")
+    assert rate["median"] > 0.0
+    assert 0.0 < share["median"] <= 1.0
+
+
+def _two_runs(campaign: speed.Campaign) -> speed.Campaign:
+    axis = next(iter(campaign.file.grid))
+    grid = {axis: campaign.file.grid[axis][:1]}
+    file = campaign.file.model_copy(update={"grid": grid, "seeds": 1})
+    return speed.Campaign(file, campaign.base | {"duration_s": 1.0})
 
 
 def test_a_ratio_has_an_interval_that_holds_what_changed() -> None:
