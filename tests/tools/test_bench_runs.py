@@ -72,7 +72,7 @@ def test_the_campaign_is_the_built_in_one_with_fewer_runs() -> None:
 
 def test_a_campaign_is_timed_with_its_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two runs of one second on real workers: a rate, and the share of the workers' time."""
-    monkeypatch.setattr(speed, "_thinned", lambda campaign: _two_runs(campaign))
+    monkeypatch.setattr(speed, "_thinned", _two_runs)
     done = hil("bench", "campaign", "--runs", 1, "--json")
     rate, share = done.json["figures"]
     assert (rate["name"], rate["unit"]) == ("campaign of 2 runs", "runs/s")
