@@ -43,13 +43,14 @@ from hil.wire.link import BoardLink
 from vision.localisers.making import make_localiser
 
 if TYPE_CHECKING:
+    from hil.config.camera import CameraConfig
     from hil.config.scenario import Scenario
     from hil.core.registry import Entry
     from hil.core.rig import Rig
-    from hil.core.types import OuterLaw, PoseMeasurement
+    from hil.core.types import OuterLaw, Pose, PoseMeasurement
     from hil.record.memory import RunSink
     from hil.record.reader import RunRecord
-    from vision.tracker import Localiser
+    from vision.tracker import Image, Localiser
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,18 +269,25 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
     )
 
 
-class _NoImages:
-    """The localiser of a run whose frames bring their poses: it is never asked."""
+class _WhenAsked:
+    """The localiser of a run whose frames bring their poses: made when an image comes after all."""
 
-    def locate(self, *_looked_at: object) -> PoseMeasurement:
-        """Refuse: there is no image to look at."""
-        raise AssertionError("an image came in a run without images")
+    def __init__(self, camera: CameraConfig) -> None:
+        self._camera = camera
+        self._made: Localiser | None = None
+
+    def locate(
+        self, image_bgr: Image, predicted: Pose | None, search_radius_m: float
+    ) -> PoseMeasurement:
+        """Return what the camera's localiser says."""
+        self._made = self._made or make_localiser(self._camera)
+        return self._made.locate(image_bgr, predicted, search_radius_m)
 
 
 def _localiser_of(spec: RunSpec) -> Localiser:
     """Return the localiser of a run; where poses are drawn its projections need not be worked out."""
-    if spec.target in SIMULATED and spec.camera == "pose":
-        return _NoImages()
+    if is_simulated(spec.target) and spec.camera == "pose":
+        return _WhenAsked(spec.scenario.camera)
     return make_localiser(spec.scenario.camera)
 
 
