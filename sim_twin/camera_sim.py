@@ -42,9 +42,7 @@ class RenderedCamera:
     def __init__(self, camera: CameraConfig, seed: int) -> None:
         self.width_px = camera.width_px
         self.height_px = camera.height_px
-        view = _view(camera)
-        floor_m = np.asarray(_native.floor_map(view))
-        self._renderer = _native.Renderer(view, _scene(camera.scene, floor_m), _robot(camera), seed)
+        self._renderer = _renderer(camera).reseeded(seed)
 
     def make(self, index: int, poses: Sequence[tuple[float, float, float]]) -> NDArray[np.uint8]:
         """Return frame `index`, (height, width, 3) uint8 BGR.
@@ -54,6 +52,26 @@ class RenderedCamera:
         """
         image: NDArray[np.uint8] = self._renderer.make(index, poses)
         return image
+
+
+# The renderer of the last camera, by its configuration: the next run mostly has the same.
+_kept: dict[str, _native.Renderer] = {}
+
+
+def _renderer(camera: CameraConfig) -> _native.Renderer:
+    """Return a camera's renderer; lines of sight, floor and light take a third of a second.
+
+    None of them depends on the seed, which is 0 here.
+    """
+    key = camera.model_dump_json()
+    found = _kept.get(key)
+    if found is None:
+        view = _view(camera)
+        floor_m = np.asarray(_native.floor_map(view))
+        found = _native.Renderer(view, _scene(camera.scene, floor_m), _robot(camera), 0)
+        _kept.clear()
+        _kept[key] = found
+    return found
 
 
 def _view(camera: CameraConfig) -> _native.View:

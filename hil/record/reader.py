@@ -117,7 +117,8 @@ def read_run(path: Path) -> RunRecord:
     problems += altered_files(path, manifest)
     samples = read_table(path, layout.SAMPLES, layout.SAMPLES_JOURNAL, required=True)
     rows = samples["t_s"].size if "t_s" in samples else 0
-    samples = {name: np.full(rows, math.nan) for name in ADDED_LATER} | samples
+    if not set(ADDED_LATER) <= set(samples):
+        samples = {name: np.full(rows, math.nan) for name in ADDED_LATER} | dict(samples)
     missing = [name for name in manifest.sample_names if name not in samples]
     if missing:
         raise BadInput(f"{path / layout.SAMPLES}: damaged: column {missing[0]} is missing")

@@ -180,7 +180,11 @@ class _Sender:
             norm_m = np.hypot(x_m, y_m)
             derived = {"error_x_m": x_m, "error_y_m": y_m, "error_norm_m": norm_m}
             for plot in (*PLOTS, *own_plots(self._run)):
-                self._plot(plot, samples | derived, style)
+                lines = {
+                    name: derived[name] if name in derived else samples[name]
+                    for _, name, _ in plot.lines
+                }
+                self._plot(plot, lines, style)
         if self._run.pictures:
             self._camera()
         if self._run.events:

@@ -44,12 +44,14 @@ from hil.wire.link import BoardLink
 from vision.localisers.making import make_localiser
 
 if TYPE_CHECKING:
+    from hil.config.camera import CameraConfig
     from hil.config.scenario import Scenario
     from hil.core.registry import Entry
     from hil.core.rig import Rig
-    from hil.core.types import OuterLaw
+    from hil.core.types import OuterLaw, Pose, PoseMeasurement
     from hil.record.memory import RunSink
     from hil.record.reader import RunRecord
+    from vision.tracker import Image, Localiser
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,7 +259,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
         rig=rig,
         link=BoardLink(rig.stream, timeline.link_frame),
         camera_clock=CameraClock(scenario.camera.latency_s),
-        localiser=make_localiser(scenario.camera),
+        localiser=_localiser_of(spec),
         estimator=make_estimator(control.estimator, control, vehicle.geometry),
         law=TurnFirst(
             WithinWheelSpeed(law or make_law(spec), vehicle, wheel_speed_max_rad_s(scenario)),
@@ -269,6 +271,28 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
         timeline=timeline,
         own_terms=tuple(OUTER_LAWS.get(spec.outer).trace),
     )
+
+
+class _WhenAsked:
+    """The localiser of a run whose frames bring their poses: made when an image comes after all."""
+
+    def __init__(self, camera: CameraConfig) -> None:
+        self._camera = camera
+        self._made: Localiser | None = None
+
+    def locate(
+        self, image_bgr: Image, predicted: Pose | None, search_radius_m: float
+    ) -> PoseMeasurement:
+        """Return what the camera's localiser says."""
+        self._made = self._made or make_localiser(self._camera)
+        return self._made.locate(image_bgr, predicted, search_radius_m)
+
+
+def _localiser_of(spec: RunSpec) -> Localiser:
+    """Return the localiser of a run; where poses are drawn its projections need not be worked out."""
+    if is_simulated(spec.target) and spec.camera == "pose":
+        return _WhenAsked(spec.scenario.camera)
+    return make_localiser(spec.scenario.camera)
 
 
 def make_manifest(spec: RunSpec) -> Manifest:

@@ -307,15 +307,17 @@ class Session:
         return True
 
     def _take_all(self, now_s: float) -> None:
-        parts = self._parts
-        for report in parts.link.poll(now_s):
+        link = self._parts.link
+        for report in link.poll(now_s):
             self._report = report
-            parts.estimator.on_wheels(report.sample)
-            if report.round_trip_s == report.round_trip_s:
-                self._uplink_s += _UPLINK_GAIN * (0.5 * report.round_trip_s - self._uplink_s)
-        while (frame := parts.rig.poll_frame()) is not None:
+            self._parts.estimator.on_wheels(report.sample)
+            round_trip_s = report.round_trip_s
+            if not math.isnan(round_trip_s):
+                self._uplink_s += _UPLINK_GAIN * (0.5 * round_trip_s - self._uplink_s)
+        poll_frame = self._parts.rig.poll_frame
+        while (frame := poll_frame()) is not None:
             self._take_frame(frame, now_s)
-        if parts.link.texts_heard != self._texts_noted:
+        if link.texts_heard != self._texts_noted:
             self._note_texts()
 
     def _note_texts(self) -> None:

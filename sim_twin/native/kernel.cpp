@@ -140,7 +140,7 @@ void Kernel::follow_outside(double h_s) {
   const double charge = plant_.charge_after(h_s, drive_);
   const auto done_us = static_cast<double>(time_us_ + options_.step_us - outside_from_us_);
   const double share = done_us / static_cast<double>(outside_period_us_);
-  StateVector& x = plant_.state();
+  StateVector& x = plant_.changed_state();
   for (int i = 0; i < kStates; ++i) {
     x[i] = share < 1.0 ? outside_from_[i] + share * (outside_to_[i] - outside_from_[i])
                        : outside_to_[i];
@@ -156,8 +156,7 @@ void Kernel::integrate() {
   }
   sag_v_ = 0.0;
   if (disturbances_.empty() || time_us_ < begin_us_) {
-    constexpr LoadVector kNone{};
-    plant_.step(h_s, drive_, kNone, kNone, kNone);
+    plant_.step(h_s, drive_);
     return;
   }
   const double t_s = 1e-6 * static_cast<double>(time_us_ - begin_us_);
@@ -187,14 +186,18 @@ void Kernel::step() {
   }
   edges_.clear();
   for (int side = 0; side < 2; ++side) {
+    // Nothing comes of a wheel that has not turned while no wire changes.
+    if (faults_.empty() && encoders_[side].stands_at(x[kWheelL + side])) continue;
     const int port = fault_.encoders_exchanged ? 1 - side : side;
     // The encoder sits on the motor, which turns on where the gear slips.
     const double moved_rad = x[kWheelL + side] - wheel_rad[side];
     slipped_rad_[side] += moved_rad * (1.0 / fault_.side[side].grip - 1.0);
     encoders_[side].move(x[kWheelL + side] + slipped_rad_[side], t0_us, h_us, fault_.side[side], port, edges_);
   }
-  std::stable_sort(edges_.begin(), edges_.end(),
-                   [](const PinEdge& a, const PinEdge& b) { return a.t_us < b.t_us; });
+  if (edges_.size() > 1) {
+    std::stable_sort(edges_.begin(), edges_.end(),
+                     [](const PinEdge& a, const PinEdge& b) { return a.t_us < b.t_us; });
+  }
   for (const PinEdge& edge : edges_) board_->edge(edge);
   time_us_ += options_.step_us;
   battery_v_ = plant_.battery_v(drive_, sag_v_);
