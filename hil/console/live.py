@@ -15,7 +15,6 @@ import sys
 import time
 from array import array
 from collections import deque
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -203,14 +202,17 @@ class Live:
         except asyncio.IncompleteReadError:
             pass
         status = await process.wait()
-        if not self._end and not self._refused:
+        if process is self._process:
             self._refused = f"the run's process ended with status {status}; see worker.log"
+            self._over()
+            self.tell()
         if process.stdin is not None:
             process.stdin.close()
-        self._process = None
-        self.phase = "ended"
-        self.tell()
-        await self.warm()
+
+    def _over(self) -> None:
+        """Take note that the robot stands; the process may still have its report to write."""
+        self._process, self.phase = None, "ended"
+        asyncio.get_running_loop().create_task(self.warm())
 
     def _take(self, kind: bytes, body: bytes) -> None:
         if kind == ROWS:
@@ -236,8 +238,12 @@ class Live:
             return
         elif "end" in message:
             self._end = message["end"]
+            self._over()
         elif "refused" in message:
             self._refused = message["refused"]
+            self._over()
+        elif "report" in message:
+            self._end = self._end | {"report": message["report"]}
         self.tell()
         if "begin" in message:
             self._people.tell("history", self._history())
@@ -308,8 +314,3 @@ def _rounded(rows: np.ndarray[Any, np.dtype[np.float64]]) -> list[list[float]]:
 def name_of(page: Page, people: People) -> str:
     """Return how a record names who pressed STOP."""
     return "the operator" if page.key == people.operator else "a viewer"
-
-
-def reports_folder(folders: Folders) -> Path:
-    """Return where reports are kept."""
-    return folders.own / "reports"

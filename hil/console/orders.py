@@ -96,7 +96,9 @@ def _target(target: str, folders: Folders) -> str:
         return f"{REPLAY}{folders.record(target.removeprefix(REPLAY))}"
     if target in SIMULATED or target.startswith("serial:"):
         return target
-    raise BadInput(f"target {visible(target)}: choose twin, pil, serial:DEV[@BAUD] or replay:RECORD")
+    raise BadInput(
+        f"target {visible(target)}: choose twin, pil, serial:DEV[@BAUD] or replay:RECORD"
+    )
 
 
 def _camera(camera: str, folders: Folders) -> str:

@@ -37,7 +37,7 @@ class Page:
         if kind == "live" and isinstance(waiting, dict) and isinstance(message, dict):
             rows = [*waiting.get("trail", ()), *message.get("trail", ())][-_TRAIL_ROWS:]
             events = [*waiting.get("events", ()), *message.get("events", ())][-_TRAIL_ROWS:]
-            message = message | {"trail": rows, "events": events}
+            message = waiting | message | {"trail": rows, "events": events}
         self._slots[kind] = message
         self._filled.set()
 

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 from hil.console.folders import Folders
 from hil.console.hand_over import HandOver, floor_of
 from hil.console.orders import Order, order_of, spec_of
+from hil.console.reports import write_report
 from hil.core.errors import HilError
 from hil.record.schema import FRAME_NAMES
 from hil.runs.execute import exit_status, make_manifest
@@ -77,12 +78,16 @@ class Commands:
 
 def main() -> int:
     """Serve one order; the status is that of `hil run`."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job begins with it ignored
+    signal.signal(
+        signal.SIGINT, signal.default_int_handler
+    )  # a background job begins with it ignored
     take_signals()
     sys.setswitchinterval(_SWITCH_S)
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a law prints is not part of the messages
     folders = Folders(Path(sys.argv[1]), Path(sys.argv[2]))
+    import hil.report.html  # noqa: F401, PLC0415 - while it waits: the report comes sooner
+
     try:
         line = sys.stdin.buffer.raw.readline() if hasattr(sys.stdin.buffer, "raw") else b""
     except KeyboardInterrupt:
@@ -98,6 +103,8 @@ def main() -> int:
         commands.close()
         hand_over.close()
         hand_over.say(end=end_of(record, folders))
+        write_report(folders, [record.path])
+        hand_over.say(report=True)
         return exit_status(record)
     except HilError as error:
         hand_over.close()
