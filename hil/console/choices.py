@@ -18,12 +18,13 @@ from hil.config.scenario import Scenario
 from hil.console.folders import Folders
 from hil.console.hand_over import floor_of
 from hil.console.people import plain
-from hil.core.errors import HilError
+from hil.core.errors import BadInput, HilError
 from hil.core.figures import BY_NAME
 from hil.core.files import read_bounded
 from hil.runs.execute import INNER_LAWS
 from hil.tools.doctor import examine
 from hil.tools.inventory import listing
+from hil.tools.serve_folder import default_names
 
 # A file of one's own is looked for so far below the folder where the console was started.
 _DEPTH = 2
@@ -36,6 +37,7 @@ _NOT_IN = {"node_modules", "build", "dist", "__pycache__", "site-packages", "tes
 def choices(folders: Folders) -> dict[str, Any]:
     """Return everything there is to choose from for a run."""
     own = list(_own_files(folders))
+    served = list(_served_twins())
     return {
         "scenarios": _named("scenarios") + [item for item in own if item["is"] == "scenario"],
         "laws": [
@@ -47,7 +49,8 @@ def choices(folders: Folders) -> dict[str, Any]:
         "campaigns": _named("campaigns") + [item for item in own if item["is"] == "campaign"],
         "robots": _named("robots") + [item for item in own if item["is"] == "robot"],
         "cameras": [item for item in own if item["is"] == "camera"],
-        "targets": _targets(),
+        "targets": _targets() + served,
+        "served": served,
         "folder": str(folders.work),
     }
 
@@ -70,6 +73,21 @@ def _targets() -> list[dict[str, str]]:
         if f.hint.startswith("--on serial:")
     ]
     return found
+
+
+def _served_twins() -> Iterator[dict[str, str]]:
+    """Yield the twins that `hil twin serve` serves under its usual names."""
+    try:
+        names = list(default_names())
+    except BadInput:
+        return
+    for port, camera in names:
+        if port.is_symlink() and camera.is_socket():
+            yield {
+                "name": f"serial:{port}",
+                "camera": f"twin:{camera}",
+                "summary": "served twin, in real time",
+            }
 
 
 def _own_files(folders: Folders) -> Iterator[dict[str, Any]]:

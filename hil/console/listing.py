@@ -1,7 +1,7 @@
 """The list of records: what each was and how it ended, read once and kept.
 
-A record is known by the time and size of its manifest, so that a list of thousands is made from an index in the
-console's own folder, and only what is new is opened.
+A record is known by the time and size of its manifest, so that a list of thousands is made from an
+index in the console's own folder, and only what is new is opened.
 """
 
 from __future__ import annotations

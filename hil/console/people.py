@@ -1,7 +1,8 @@
 """Who looks at the console: one operator, any number of viewers, and what waits for each of them.
 
 Each page has one slot for each kind of message, which the newest takes: a page that reads slowly, or has
-gone without a word, holds nothing and nobody up. Only the operator starts and changes things; STOP is for all.
+gone without a word, holds nothing and nobody up. Only the operator starts and changes things; STOP is
+for all.
 """
 
 from __future__ import annotations
@@ -81,9 +82,9 @@ class People:
     @property
     def operator(self) -> str:
         """Return the operator's key, "" when there is none."""
-        if self._operator and not self._open(self._operator):
-            if self._clock() - self._gone_s > GRACE_S:
-                self._operator = ""
+        gone = self._operator and not self._open(self._operator)
+        if gone and self._clock() - self._gone_s > GRACE_S:
+            self._operator = ""
         return self._operator
 
     def _open(self, key: str) -> bool:

@@ -31,7 +31,8 @@ def serve(
     shown = f"[{host}]" if ":" in host else host
     address = f"http://{shown}:{port}/?token={token}"
     config = uvicorn.Config(
-        application(folders, gate, begins_with), log_level="warning", ws="websockets-sansio", ws_max_size=65536,
+        application(folders, gate, begins_with), log_level="warning",
+        ws="websockets-sansio", ws_max_size=65536,
         ws_ping_interval=5.0, ws_ping_timeout=10.0, lifespan="on", server_header=False,
         timeout_graceful_shutdown=3,
     )  # fmt: skip
@@ -50,6 +51,7 @@ def _listener(host: str, port: int) -> socket.socket:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((host, port))
+        listener.listen(100)
     except (OSError, OverflowError) as error:
         listener.close()
         why = getattr(error, "strerror", None) or str(error)

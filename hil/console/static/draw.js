@@ -40,7 +40,7 @@ export function drawFloor(canvas, floor, trail, sigma) {
   if (!place || !floor) return;
   const { pen, width, height } = place;
   const [x0, x1, y0, y1] = floor.fence;
-  const margin = 26;
+  const margin = 38;
   const scale = Math.min((width - 2 * margin) / (x1 - x0), (height - 2 * margin) / (y1 - y0));
   const left = (width - scale * (x1 - x0)) / 2, low = (height + scale * (y1 - y0)) / 2;
   const at = (x, y) => [left + (x - x0) * scale, low - (y - y0) * scale];
@@ -113,8 +113,9 @@ export function drawChart(canvas, lines, end, unit) {
   const place = ready(canvas);
   if (!place) return;
   const { pen, width, height } = place;
-  let low = 0, high = 1e-9;
+  let low = 0, high = 0;
   for (const { values } of lines) for (const [, v] of values) if (Number.isFinite(v)) { low = Math.min(low, v); high = Math.max(high, v); }
+  if (high === low) high = 1;
   const left = 46, bottom = height - 18, top = 8, right = width - 8;
   const px = (t) => left + (right - left) * (t / Math.max(end, 1e-9));
   const py = (v) => bottom - (bottom - top) * ((v - low) / (high - low));

@@ -16,19 +16,20 @@ export function make(place, whenChanged) {
   const target = el("input", { value: "twin", list: "targets", spellcheck: false, on: { input: simulatedOnly } });
   fill(place,
     field("scenario", "Scenario", scenario), el("p", { class: "help", id: "scenario-said" }),
-    field("law", "Outer law", law),
-    field("inner", "Wheel law", el("select")),
-    field("target", "Target", target), el("datalist", { id: "targets" }),
-    field("camera", "Camera", el("input", { placeholder: "as the scenario says", list: "cameras", spellcheck: false })),
-    el("datalist", { id: "cameras" }, ...["pose", "rendered", "0", "1"].map((value) => el("option", { value }))),
-    field("seed", "Seed", el("input", { type: "number", min: 0, max: 2147483647, value: 1, required: true })),
+    el("div", { class: "fields" },
+      field("law", "Outer law", law),
+      field("inner", "Wheel law", el("select")),
+      field("target", "Target", target),
+      field("camera", "Camera", el("input", { placeholder: "as the scenario says", list: "cameras", spellcheck: false })),
+      field("seed", "Seed", el("input", { type: "number", min: 0, max: 2147483647, value: 1, required: true }))),
+    el("datalist", { id: "targets" }), el("datalist", { id: "cameras" }),
     el("label", { class: "check" }, el("input", { type: "checkbox", id: "real-time", checked: true }), "Watch a simulated run at real speed"),
     el("label", { class: "check" }, el("input", { type: "checkbox", id: "dead-man" }), "Dead man: stop when this page is gone for 1 s"),
-    el("h3", {}, "Changed values"),
-    el("ul", { class: "plain", id: "overrides" }),
-    field("setting", "Change a value", el("input", { list: "settings", placeholder: "type a part of its name", spellcheck: false, on: { input: showSetting } })),
-    el("datalist", { id: "settings" }),
-    el("div", { id: "setting-said" }));
+    el("details", { id: "changes" }, el("summary", { id: "changes-title" }, "Change values"),
+      el("ul", { class: "plain", id: "overrides" }),
+      field("setting", "Name of the value", el("input", { list: "settings", placeholder: "type a part of it, for example mass", spellcheck: false, on: { input: showSetting } })),
+      el("datalist", { id: "settings" }),
+      el("div", { id: "setting-said" })));
 }
 
 export async function refresh() {
@@ -40,6 +41,8 @@ export async function refresh() {
   byId("target").value ||= choices.target;
   if (byId("target").value === "twin") byId("target").value = choices.target;
   byId("camera").value ||= choices.camera;
+  const cameras = [["pose", "no pictures, drawn errors"], ["rendered", "pictures"], ["0", "first camera"], ...choices.served.map((item) => [item.camera, item.summary])];
+  fill(byId("cameras"), ...cameras.map(([value, text]) => el("option", { value }, text)));
   simulatedOnly();
   await load();
   return choices;
@@ -60,6 +63,8 @@ async function load() {
 }
 
 function simulatedOnly() {
+  const served = choices?.served.find((item) => item.name === byId("target").value);
+  if (served && !byId("camera").value) byId("camera").value = served.camera;
   byId("real-time").disabled = !["twin", "pil"].includes(byId("target").value);
 }
 
@@ -102,6 +107,7 @@ function showSetting() {
 }
 
 function list() {
+  byId("changes-title").textContent = overrides.size ? `Change values (${overrides.size} changed)` : "Change values";
   fill(byId("overrides"), ...[...overrides].map(([key, value]) => el("li", { class: "override" },
     el("code", {}, `${key} = ${value}`),
     el("button", { type: "button", "aria-label": `Undo ${key}`, on: { click: () => { overrides.delete(key); list(); } } }, "Undo"))));

@@ -13,14 +13,14 @@ function show() {
   const [name] = (location.hash.slice(1) || "run").split("?");
   const chosen = parts[name] ? name : "run";
   for (const part of Object.keys(parts)) {
-    byId(part).hidden = part !== chosen;
+    byId(`part-${part}`).hidden = part !== chosen;
     const link = document.querySelector(`nav a[href="#${part}"]`);
     if (part === chosen) link.setAttribute("aria-current", "page");
     else link.removeAttribute("aria-current");
   }
   if (!made.has(chosen)) {
     made.add(chosen);
-    parts[chosen].make(byId(chosen));
+    parts[chosen].make(byId(`part-${chosen}`));
   }
   parts[chosen].shown?.();
   document.title = `${document.querySelector(`nav a[href="#${chosen}"]`).textContent} · hil console`;
@@ -69,7 +69,7 @@ byId("theme").addEventListener("click", () => {
 
 theme();
 addEventListener("hashchange", show);
-run.make(byId("run"));
+run.make(byId("part-run"));
 made.add("run");
 show();
 connect();

@@ -42,22 +42,22 @@ export function make(place) {
           el("button", { id: "start", type: "button", class: "main", on: { click: tried(start) } }, "Start")),
         el("p", { id: "command", class: "help" }))),
     el("div", {},
-      el("div", { class: "card" },
+      el("div", { class: "card", id: "live" },
         el("div", { class: "row" }, el("h2", {}, "Live"), el("span", { id: "phase", class: "pill", role: "status" })),
         el("p", { id: "outcome", class: "banner", role: "status", hidden: true }),
         el("div", { class: "two" },
           el("div", {}, el("canvas", { class: "floor", id: "floor", role: "img", "aria-label": "Floor with fence, reference, path and robot" }),
             el("div", { class: "legend" }, key("fence", "fence"), key("ref", "reference"), key("est", "believed"), key("true", "true (simulated)"), key("right", "10 σ of the pose")),
-            el("p", { class: "help", id: "pose" })),
+            el("p", { class: "help", id: "pose" }),
+            el("div", { class: "charts" }, ...CHARTS.map(([id, title, , lines]) => el("div", {}, el("h3", {}, title),
+              el("canvas", { class: "chart", id: `chart-${id}`, role: "img", "aria-label": title }),
+              el("div", { class: "legend" }, ...lines.map(([ink, name, , dash]) => key(ink, dash ? `${name} (dashed)` : name))))))),
           el("div", {},
             el("div", { id: "picture-box", hidden: true }, el("div", { class: "picture" }, el("canvas", { id: "picture", role: "img", "aria-label": "Camera picture with marks found" })),
               el("p", { class: "help", id: "picture-said" })),
             el("h3", {}, "Requirements, as things stand"), el("ul", { class: "plain", id: "requirements" }),
             el("h3", {}, "Robot and link"), el("dl", { class: "facts", id: "facts" }),
             el("h3", {}, "Events"), el("ul", { class: "plain log", id: "events", tabIndex: 0, "aria-label": "Events" })))),
-      el("div", { class: "card two" }, ...CHARTS.map(([id, title, , lines]) => el("div", {}, el("h3", {}, title),
-        el("canvas", { class: "chart", id: `chart-${id}`, role: "img", "aria-label": title }),
-        el("div", { class: "legend" }, ...lines.map(([ink, name, , dash]) => key(ink, dash ? `${name} (dashed)` : name)))))),
       el("div", { class: "card", id: "report-box", hidden: true }, el("div", { class: "row" }, el("h2", {}, "Report"), el("a", { id: "report-link", target: "_blank", rel: "noopener" }, "in a page of its own")),
         el("iframe", { id: "report", title: "Report of the run" })))));
   form.make(runForm, (described) => {
@@ -80,7 +80,10 @@ const key = (ink, text) => {
 const isOn = () => ["starting", "running", "stopping"].includes(state.phase);
 
 function arm() { command({ do: "arm", wanted: !(state.armed_s > 0) }); }
-function start() { command({ do: "start", order: form.order() }); }
+function start() {
+  command({ do: "start", order: form.order() });
+  if (innerWidth <= 800) byId("live").scrollIntoView();
+}
 
 function buttons() {
   const armed = state.armed_s > 0 && !isOn();
