@@ -73,8 +73,8 @@ class Gate:
 
     def knows_host(self, host: str) -> bool:
         """Say whether a Host header names this server."""
-        parts = urlsplit(f"//{host}")
         try:
+            parts = urlsplit(f"//{host}")
             return parts.hostname in self.hosts and (parts.port or 80) == self.port
         except ValueError:
             return False

@@ -22,7 +22,7 @@ import numpy as np
 from hil.analysis import metrics
 from hil.console.folders import Folders
 from hil.console.hand_over import FRAME_LENGTH, HEAD, PICTURE, ROWS
-from hil.console.orders import Order
+from hil.console.orders import Order, inside
 from hil.console.people import Message, Page, People
 from hil.core.errors import BadInput
 
@@ -135,11 +135,12 @@ class Live:
             log.close()
 
     async def start(self, order: Order) -> None:
-        """Start a run; raises BadInput while another is on, and where it was not armed before."""
+        """Start a run; raises BadInput while another is on, where it was not armed, for files elsewhere."""
         if self.busy:
             raise BadInput("a run is on: STOP it first, or wait for its end")
         if not self.armed:
             raise BadInput("not armed: arm first, then start")
+        inside(order, self._folders)
         self._armed_until_s = -math.inf
         self._forget()
         self._run_id += 1

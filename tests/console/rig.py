@@ -107,10 +107,11 @@ class SocketPage:
 
     def __init__(self, console: Console, key: str) -> None:
         self.key = key
-        self.socket: ClientConnection = connect(
-            f"ws://{console.host}/ws?page={key}", origin=console.origin,  # type: ignore[arg-type]
+        self._entered = connect(
+            f"ws://{console.host}/ws?{urlencode({'page': key})}", origin=console.origin,  # type: ignore[arg-type]
             additional_headers={"Cookie": console.cookie},
         )  # fmt: skip
+        self.socket: ClientConnection = self._entered.__enter__()
 
     def __enter__(self) -> Self:
         return self
@@ -142,11 +143,21 @@ class SocketPage:
                 return heard
         raise AssertionError(f"{kind} {wanted} did not come: {heard[-3:]}")
 
-    def run(self, **order: Any) -> list[Any]:
-        """Arm, start, and return all that was heard up to the end of the run."""
+    def begin(self, **order: Any) -> None:
+        """Arm and start, and wait until it is under way."""
         self.say(do="arm", wanted=True)
         self.say(do="start", order=order)
         self.until("state", phase="starting")
+
+    def ticks(self) -> list[Any]:
+        """Wait for ticks; return their rows."""
+        while True:
+            if rows := self.until("live")[-1].get("trail"):
+                return list(rows)
+
+    def run(self, **order: Any) -> list[Any]:
+        """Arm, start, and return all that was heard up to the end of the run."""
+        self.begin(**order)
         return self.until("state", phase="ended")
 
 

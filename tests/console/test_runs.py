@@ -40,8 +40,7 @@ def test_same_bytes_with_no_one_five_viewers(console, tmp_path):
         assert operator.run(**ORDER | {"seed": 4})[-1]["end"]["outcome"] == "complete"
         assert samples(console, operator.run(**ORDER | {"seed": 4})) != wanted  # a control
         for viewer in viewers:
-            heard = viewer.until("state", phase="ended")
-            assert any(isinstance(m, dict) and m.get("trail") for m in heard)
+            assert viewer.ticks()
             viewer.socket.close()
 
 
@@ -81,12 +80,15 @@ def test_wrong_orders_are_one_line(console):
         for change, said in (
             ({"overrides": ["duration_s=-1"]}, "duration_s = -1"),
             ({"law": "asg-ims"}, "near"),
-            ({"scenario": "scenario-9"}, "scenario-9"),
             ({"target": "serial:/dev/nothing"}, "/dev/nothing"),
         ):
             heard = operator.run(**ORDER | change)
             assert said in heard[-1]["refused"]
             assert "\n" not in heard[-1]["refused"]
+        operator.say(do="arm", wanted=True)
+        operator.say(do="start", order=ORDER | {"scenario": "scenario-9"})
+        assert "scenario-9: no .toml file" in operator.until("said")[-1]["error"]
+        operator.say(do="arm", wanted=False)
         operator.say(do="start", order=ORDER)
         assert "not armed" in operator.until("said")[-1]["error"]
         viewer.say(do="arm", wanted=True)
@@ -103,11 +105,8 @@ def test_wrong_orders_are_one_line(console):
 def test_anybody_stops(console):
     """STOP by a viewer in mid-run: the robot stands, the record is whole and says who did it."""
     with console.page("op") as operator, console.page("looks") as viewer:
-        operator.say(do="arm", wanted=True)
-        operator.say(do="start", order=ORDER | {"real_time": True, "overrides": []})
-        viewer.until("live")
-        while not viewer.until("live")[-1].get("trail"):
-            pass
+        operator.begin(**ORDER | {"real_time": True, "overrides": []})
+        viewer.ticks()
         viewer.say(do="stop")
         end = operator.until("state", phase="ended")[-1]["end"]
     assert end["outcome"] == "interrupted"
@@ -124,8 +123,7 @@ def test_the_dead_man_stops_when_the_page_is_silent(console):
     """Beats keep the run going, their absence ends it; without the option silence is nothing."""
     long = ORDER | {"real_time": True, "overrides": ["duration_s=6"]}
     with console.page("op") as operator:
-        operator.say(do="arm", wanted=True)
-        operator.say(do="start", order=long | {"dead_man": True})
+        operator.begin(**long | {"dead_man": True})
         operator.until("state", phase="running")
         end_s = time.monotonic() + 2.0
         while time.monotonic() < end_s:
@@ -145,12 +143,8 @@ def test_a_console_that_is_killed_stops_the_robot(tmp_path):
         Console(tmp_path) as console,
     ):
         with console.page("op") as operator:
-            operator.say(do="arm", wanted=True)
-            operator.say(
-                do="start", order={"scenario": "scenario-1", "target": target, "camera": camera}
-            )
-            while not operator.until("live")[-1].get("trail"):
-                pass
+            operator.begin(scenario="scenario-1", target=target, camera=camera)
+            operator.ticks()
         console.end(signal.SIGKILL)
         (record,) = [path for path in console.records.iterdir() if path.name.startswith("scenario")]
         end_s = time.monotonic() + PATIENCE_S
