@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -70,10 +71,15 @@ class Listing:
     def __init__(self, folders: Folders) -> None:
         self._folders = folders
         self._known: dict[str, tuple[int, int, Item]] = {}
+        self._one_at_a_time = threading.Lock()
         self._load()
 
     def items(self) -> list[Item]:
         """Return every record there is now, the newest first."""
+        with self._one_at_a_time:
+            return self._items()
+
+    def _items(self) -> list[Item]:
         found, changed = {}, False
         for path in self._folders.records():
             name = self._folders.name_of(path)

@@ -194,12 +194,15 @@ class Live:
 
     async def _follow(self, process: asyncio.subprocess.Process) -> None:
         """Read the run's messages to the end."""
+        run = self._run_id
         assert process.stdout is not None
         try:
             while True:
                 head = await process.stdout.readexactly(HEAD.size)
                 kind, size = HEAD.unpack(head)
-                self._take(kind, await process.stdout.readexactly(size))
+                body = await process.stdout.readexactly(size)
+                if run == self._run_id:  # else it still writes its report, and another has begun
+                    self._take(kind, body)
         except asyncio.IncompleteReadError:
             pass
         status = await process.wait()

@@ -233,7 +233,9 @@ def application(
     @contextlib.asynccontextmanager
     async def lifespan(_app: Starlette) -> AsyncIterator[None]:
         await live.warm()
+        reading = asyncio.create_task(asyncio.to_thread(console.listing.items))
         yield
+        await reading
         await console.campaigns.close()
         await live.close()
 

@@ -80,7 +80,7 @@ def test_wrong_orders_are_one_line(console):
         for change, said in (
             ({"overrides": ["duration_s=-1"]}, "duration_s = -1"),
             ({"law": "asg-ims"}, "near"),
-            ({"target": "serial:/dev/nothing"}, "/dev/nothing"),
+            ({"target": "serial:/dev/nothing"}, "camera 'pose'"),
         ):
             heard = operator.run(**ORDER | change)
             assert said in heard[-1]["refused"]
