@@ -53,6 +53,7 @@ class Live:
     def __init__(self, folders: Folders, people: People) -> None:
         self._folders = folders
         self._people = people
+        people.in_a_run = lambda: self.busy
         self._spare: asyncio.subprocess.Process | None = None
         self._process: asyncio.subprocess.Process | None = None
         self._armed_until_s = -math.inf

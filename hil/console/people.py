@@ -75,16 +75,17 @@ class People:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
+        self.in_a_run: Callable[[], bool] = lambda: False
         self.pages: set[Page] = set()
         self._operator = ""
         self._gone_s = -math.inf  # since when no page of the operator is open
 
     @property
     def operator(self) -> str:
-        """Return the operator's key, "" when there is none."""
+        """Return the operator's key, "" when there is none: gone for good, or gone while nothing runs."""
         gone = self._operator and not self._open(self._operator)
-        if gone and self._clock() - self._gone_s > GRACE_S:
-            self._operator = ""
+        if gone and (not self.in_a_run() or self._clock() - self._gone_s > GRACE_S):
+            return ""
         return self._operator
 
     def _open(self, key: str) -> bool:

@@ -22,6 +22,8 @@ from hil.console.hand_over import HandOver, floor_of
 from hil.console.orders import Order, order_of, spec_of
 from hil.console.reports import write_report
 from hil.core.errors import HilError
+from hil.record.layout import MANIFEST
+from hil.record.reader import read_run
 from hil.record.schema import FRAME_NAMES
 from hil.runs.execute import exit_status, make_manifest
 from hil.runs.interruption import take_signals
@@ -86,8 +88,6 @@ def main() -> int:
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a law prints is not part of the messages
     folders = Folders(Path(sys.argv[1]), Path(sys.argv[2]))
-    import hil.report.html  # noqa: F401, PLC0415 - while it waits: the report comes sooner
-
     try:
         line = sys.stdin.buffer.raw.readline() if hasattr(sys.stdin.buffer, "raw") else b""
     except KeyboardInterrupt:
@@ -139,7 +139,15 @@ def _run(order: Order, folders: Folders, hand_over: HandOver) -> RunRecord:
             "notes": manifest.notes,
         }
     )
-    return execute(spec, watch=hand_over)
+    try:
+        return execute(spec, watch=hand_over)
+    except KeyboardInterrupt:
+        if not (spec.out / MANIFEST).is_file():
+            raise
+        record = read_run(spec.out)
+        if record.manifest.outcome == "running":
+            raise
+        return record  # pressed again while the record was being closed: it is whole
 
 
 def end_of(record: RunRecord, folders: Folders) -> dict[str, Any]:

@@ -20,8 +20,6 @@ from hil.wire import dialect
 from hil.wire.framing import FrameReader
 from tests.console.rig import PATIENCE_S, Console, browser, served_twin
 
-LIMIT_MS = 150.0
-
 
 def zero_pwm_unix_ms(record: Path) -> float:
     """Return when the last report with PWM was followed by those without, in ms of Unix time."""
@@ -45,7 +43,8 @@ def one(page: Any, records: Path, after_ms: int) -> tuple[float, Path]:
 
     page.click("#arm")
     page.click("#start")
-    expect(page.locator("#facts")).to_contain_text("Battery")
+    expect(page.locator("#phase")).to_have_text("running")
+    expect(page.locator("#events")).to_contain_text("board: armed")
     page.wait_for_timeout(after_ms)
     pressed_ms = page.locator("#stop").evaluate(
         "(stop) => { stop.dispatchEvent(new PointerEvent('pointerdown', {bubbles: true}));"
@@ -58,6 +57,9 @@ def one(page: Any, records: Path, after_ms: int) -> tuple[float, Path]:
 
 def main() -> None:
     """Stop COUNT runs, each at another instant, with this page and five viewers; print what was found."""
+    from playwright.sync_api import expect  # noqa: PLC0415 - where there is a browser
+
+    expect.set_options(timeout=PATIENCE_S * 1e3)
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 5
     found = []
     with tempfile.TemporaryDirectory() as folder:

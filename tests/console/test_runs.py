@@ -163,6 +163,7 @@ def test_the_operator_is_one_and_comes_back():
     """The first page operates; after a reload it does still; gone for long, another one may."""
     now = [0.0]
     people = People(lambda: now[0])
+    people.in_a_run = lambda: True
     first, second = Page("a"), Page("b")
     people.came(first)
     people.came(second)
@@ -177,6 +178,11 @@ def test_the_operator_is_one_and_comes_back():
     now[0] = 30.0
     assert people.take_over(second)
     assert people.operator == "b"
+    people.went(second)
+    people.in_a_run = lambda: False
+    third = Page("c")
+    people.came(third)  # nothing runs: whoever comes next operates at once
+    assert people.operator == "c"
 
 
 def test_a_slot_takes_the_newest():

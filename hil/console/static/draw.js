@@ -1,5 +1,6 @@
 // The floor and the charts, drawn on canvas. World frame: X right, Y up, metres; theta counter-clockwise.
 
+// A name of the style sheet's palette.
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
 function ready(canvas) {

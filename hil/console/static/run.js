@@ -198,10 +198,12 @@ function showFacts() {
 function draw() {
   if (drawn) return;
   drawn = true;
-  requestAnimationFrame(() => {
-    drawn = false;
-    drawFloor(byId("floor"), floor, trail.map((r) => ({ x: r[X], y: r[Y], theta: r[TH], tx: r[TX] ?? NaN, ty: r[TY] ?? NaN, rx: r[RX], ry: r[RY] })), sigma);
-    const end = floor ? Math.max(floor.duration_s, trail.at(-1)?.[T] || 0) : 1;
-    for (const [id, , unit, lines] of CHARTS) drawChart(byId(`chart-${id}`), lines.map(([ink, , of, dash]) => ({ ink, dash, values: trail.map((r) => [r[T], of(r)]) })), end, unit);
-  });
+  setTimeout(() => requestAnimationFrame(paint), 60);
+}
+
+function paint() {
+  drawn = false;
+  drawFloor(byId("floor"), floor, trail.map((r) => ({ x: r[X], y: r[Y], theta: r[TH], tx: r[TX] ?? NaN, ty: r[TY] ?? NaN, rx: r[RX], ry: r[RY] })), sigma);
+  const end = floor ? Math.max(floor.duration_s, trail.at(-1)?.[T] || 0) : 1;
+  for (const [id, , unit, lines] of CHARTS) drawChart(byId(`chart-${id}`), lines.map(([ink, , of, dash]) => ({ ink, dash, values: trail.map((r) => [r[T], of(r)]) })), end, unit);
 }
