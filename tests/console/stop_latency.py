@@ -41,6 +41,7 @@ def one(page: Any, records: Path, after_ms: int) -> tuple[float, Path]:
     """Press STOP in mid-run; return the milliseconds to zero PWM and the record."""
     from playwright.sync_api import expect  # noqa: PLC0415 - where there is a browser
 
+    page.select_option("#scenario", "circle")  # the wheels always turn
     page.click("#arm")
     page.click("#start")
     expect(page.locator("#phase")).to_have_text("running")

@@ -156,7 +156,7 @@ function outcome() {
   const refused = state.refused;
   place.hidden = !(end.outcome || refused);
   if (refused) { place.className = "banner bad"; place.textContent = refused; return; }
-  if (!end.outcome) return;
+  if (!end.outcome) { place.textContent = ""; return; }
   requirements = end.requirements;
   showRequirements();
   const held = end.outcome === "complete" && end.requirements.every((item) => item.holds);
