@@ -63,6 +63,7 @@ def main() -> None:
         expect(page.locator("#outcome")).to_contain_text("-pid-")
         expect(page.locator("#report-box")).to_be_visible()
         page.click("nav a[href='#records']")
+        expect(page.locator("#r-rows tr")).to_have_count(2)
         for box in page.locator("#r-rows input").all():
             box.check()
         keep(page, "records")
