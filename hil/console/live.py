@@ -55,6 +55,8 @@ class Live:
         self._people = people
         people.in_a_run = lambda: self.busy
         self._spare: asyncio.subprocess.Process | None = None
+        self._warming = asyncio.Lock()
+        self._tasks: set[asyncio.Task[None]] = set()
         self._process: asyncio.subprocess.Process | None = None
         self._armed_until_s = -math.inf
         self._stop_s = -math.inf
@@ -89,7 +91,12 @@ class Live:
 
     def arm(self, wanted: bool) -> None:
         """Arm by hand, for ARMED_S, or lay it down."""
-        self._armed_until_s = time.monotonic() + ARMED_S if wanted and not self.busy else -math.inf
+        wanted = wanted and not self.busy
+        self._armed_until_s = time.monotonic() + ARMED_S if wanted else -math.inf
+        if wanted:
+            task = asyncio.get_running_loop().create_task(self.warm())
+            self._tasks.add(task)
+            task.add_done_callback(self._tasks.discard)
         self.tell()
 
     def state(self) -> Message:
@@ -120,8 +127,9 @@ class Live:
 
     async def warm(self) -> None:
         """Have a process ready that has loaded everything."""
-        if self._spare is None or self._spare.returncode is not None:
-            self._spare = await self._new_process()
+        async with self._warming:
+            if self._spare is None or self._spare.returncode is not None:
+                self._spare = await self._new_process()
 
     async def _new_process(self) -> asyncio.subprocess.Process:
         log = (self._folders.own / "worker.log").open("ab")
@@ -217,7 +225,6 @@ class Live:
     def _over(self) -> None:
         """Take note that the robot stands; the process may still have its report to write."""
         self._process, self.phase = None, "ended"
-        asyncio.get_running_loop().create_task(self.warm())
 
     def _take(self, kind: bytes, body: bytes) -> None:
         if kind == ROWS:

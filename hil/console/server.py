@@ -232,7 +232,6 @@ def application(
 
     @contextlib.asynccontextmanager
     async def lifespan(_app: Starlette) -> AsyncIterator[None]:
-        await live.warm()
         reading = asyncio.create_task(asyncio.to_thread(console.listing.items))
         yield
         await reading

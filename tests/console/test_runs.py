@@ -24,31 +24,37 @@ def console(tmp_path_factory):
         yield started
 
 
+@pytest.fixture(scope="module")
+def heard(console):
+    """Return what the operator hears of one run, nobody else looking."""
+    with console.page("op") as operator:
+        told = operator.run(**ORDER)
+        return told + operator.until("state", phase="ended", end=told[-1]["end"] | {"report": True})
+
+
 def samples(console, heard):
     """Return the bytes of the samples of the run that was heard."""
     return (console.records / heard[-1]["end"]["record"] / "samples.parquet").read_bytes()
 
 
-def test_same_bytes_with_no_one_five_viewers(console, tmp_path):
-    """samples.parquet is that of `hil run`, with viewers that read, and with ones that never do."""
-    hil.run("scenario-1", seed=3, camera="pose", duration_s=2.0, out=tmp_path / "alone")
-    wanted = (tmp_path / "alone" / "samples.parquet").read_bytes()
+def test_same_bytes_with_no_one_five_viewers(console, heard, tmp_path):
+    """samples.parquet is that of `hil run`, with nobody else, and with five viewers that read late."""
+    for seed in (3, 4):
+        out = tmp_path / str(seed)
+        hil.run("scenario-1", seed=seed, camera="pose", duration_s=2.0, out=out)
+    wanted, other = ((tmp_path / seed / "samples.parquet").read_bytes() for seed in "34")
+    assert samples(console, heard) == wanted
+    assert samples(console, heard) != other
     with console.page("op") as operator:
-        assert samples(console, operator.run(**ORDER)) == wanted
         viewers = [console.page(f"viewer {k}") for k in range(5)]
         assert samples(console, operator.run(**ORDER)) == wanted
-        assert operator.run(**ORDER | {"seed": 4})[-1]["end"]["outcome"] == "complete"
-        assert samples(console, operator.run(**ORDER | {"seed": 4})) != wanted  # a control
-        for viewer in viewers:
-            assert viewer.ticks()
-            viewer.socket.close()
+    for viewer in viewers:
+        assert viewer.ticks()
+        viewer.socket.close()
 
 
-def test_what_is_told_of_a_run(console):
+def test_what_is_told_of_a_run(console, heard):
     """Where it is, how sure, how it stands; the command of the same run; the requirements at the end."""
-    with console.page("op") as operator:
-        heard = operator.run(**ORDER)
-        operator.until("state", phase="ended", end=operator_end(heard) | {"report": True})
     begin = next(m["begin"] for m in heard if isinstance(m, dict) and m.get("begin"))
     assert begin["floor"]["fence"] == [-0.9, 0.9, -0.62, 0.62]
     live = [m for m in heard if isinstance(m, dict) and m["kind"] == "live" and m.get("trail")]
@@ -68,11 +74,6 @@ def test_what_is_told_of_a_run(console):
     assert b"<svg" in page or b"<img" in page
 
 
-def operator_end(heard):
-    """Return how the run ended, as the last message says it."""
-    return heard[-1]["end"]
-
-
 def test_wrong_orders_are_one_line(console):
     """A value out of bounds, an unknown law, no arming, a run by a viewer: said, and nothing is written."""
     before = set(console.records.iterdir())
@@ -80,7 +81,6 @@ def test_wrong_orders_are_one_line(console):
         for change, said in (
             ({"overrides": ["duration_s=-1"]}, "duration_s = -1"),
             ({"law": "asg-ims"}, "near"),
-            ({"target": "serial:/dev/nothing"}, "camera 'pose'"),
         ):
             heard = operator.run(**ORDER | change)
             assert said in heard[-1]["refused"]
@@ -133,7 +133,6 @@ def test_the_dead_man_stops_when_the_page_is_silent(console):
         assert end["outcome"] == "interrupted"
         events = (console.records / end["record"] / "events.jsonl").read_text()
         assert "silent for 1 s" in events
-        assert operator.run(**ORDER)[-1]["end"]["outcome"] == "complete"
 
 
 def test_a_console_that_is_killed_stops_the_robot(tmp_path):
