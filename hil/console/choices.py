@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from hil.board.wheel_laws import WHEEL_LAWS
 from hil.config.fields import Setting, settings, told
 from hil.config.load import builtin_names, dotted_names, load_scenario
 from hil.config.scenario import Scenario
@@ -21,7 +22,6 @@ from hil.console.people import plain
 from hil.core.errors import BadInput, HilError
 from hil.core.figures import BY_NAME
 from hil.core.files import read_bounded
-from hil.runs.execute import INNER_LAWS
 from hil.tools.doctor import examine
 from hil.tools.inventory import listing
 from hil.tools.serve_folder import default_names
@@ -45,7 +45,7 @@ def choices(folders: Folders) -> dict[str, Any]:
             for item in listing("laws").items
         ]
         + [item for item in own if item["is"] == "law"],
-        "inner": list(INNER_LAWS),
+        "inner": sorted(WHEEL_LAWS, key=lambda name: name != "asg-ism"),
         "campaigns": _named("campaigns") + [item for item in own if item["is"] == "campaign"],
         "robots": _named("robots") + [item for item in own if item["is"] == "robot"],
         "cameras": [item for item in own if item["is"] == "camera"],

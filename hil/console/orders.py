@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from hil.board.wheel_laws import require_wheel_law
 from hil.config.load import builtin_names, load_scenario
 from hil.core.errors import BadInput
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import is_file_name
 from hil.core.text import visible
-from hil.rigs.opening import REPLAY, SIMULATED
+from hil.rigs.opening import REPLAY, is_simulated, target_entry
 
 if TYPE_CHECKING:
     from hil.console.folders import Folders
@@ -29,7 +30,7 @@ class Order(BaseModel):
 
     scenario: _Text
     law: _Text = ""
-    inner: Literal["asg-ism", "pid"] = "asg-ism"
+    inner: _Text = "asg-ism"
     target: _Text = "twin"
     camera: _Text = ""
     seed: int = Field(1, ge=0, le=2**31 - 1)
@@ -41,7 +42,7 @@ class Order(BaseModel):
     @property
     def simulated(self) -> bool:
         """Say whether time is simulated, so that a run may be watched at its own speed."""
-        return self.target in SIMULATED
+        return is_simulated(self.target)
 
     def command(self) -> str:
         """Return the command line of the same run."""
@@ -72,6 +73,7 @@ def order_of(tree: object) -> Order:
 
 def inside(order: Order, folders: Folders) -> Order:
     """Return the order with its files whole; raises BadInput for one outside the folders it may name."""
+    require_wheel_law(order.inner)
     scenario = order.scenario
     if scenario not in builtin_names("scenarios"):
         scenario = str(folders.work_file(scenario, ".toml"))
@@ -94,11 +96,8 @@ def inside(order: Order, folders: Folders) -> Order:
 def _target(target: str, folders: Folders) -> str:
     if target.startswith(REPLAY):
         return f"{REPLAY}{folders.record(target.removeprefix(REPLAY))}"
-    if target in SIMULATED or target.startswith("serial:"):
-        return target
-    raise BadInput(
-        f"target {visible(target)}: choose twin, pil, serial:DEV[@BAUD] or replay:RECORD"
-    )
+    target_entry(target)
+    return target
 
 
 def _camera(camera: str, folders: Folders) -> str:
