@@ -39,6 +39,7 @@ from hil.runs.interruption import CtrlC
 from hil.runs.law_guard import GuardedLaw
 from hil.runs.outside import fault_of
 from hil.runs.session import Ending, Parts, Progress, Publish, Session
+from hil.runs.watched import WatchedSink
 from hil.wire.identity import board_hashes
 from hil.wire.link import BoardLink
 from vision.localisers.making import make_localiser
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
     from hil.core.types import OuterLaw, Pose, PoseMeasurement
     from hil.record.memory import RunSink
     from hil.record.reader import RunRecord
+    from hil.runs.watched import Watch
     from vision.tracker import Image, Localiser
 
 
@@ -95,10 +97,10 @@ def camera_for(scenario: Scenario, target: str, asked: str | None) -> str:
     return asked or (scenario.camera_source if is_simulated(target) else "0")
 
 
-def new_folder(stem: str) -> Path:
-    """Return a folder in runs/ that does not exist yet, named after `stem` and the time."""
+def new_folder(stem: str, root: Path = Path("runs")) -> Path:
+    """Return a folder in `root` that does not exist yet, named after `stem` and the time."""
     stamp = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
-    folder = Path("runs") / f"{stem}-{stamp}"
+    folder = root / f"{stem}-{stamp}"
     number = 2
     while folder.exists():
         folder = folder.with_name(f"{stem}-{stamp}-{number}")
@@ -111,6 +113,7 @@ def execute(
     progress: Progress | None = None,
     rig: Rig | None = None,
     publish: Publish | None = None,
+    watch: Watch | None = None,
 ) -> RunRecord:
     """Run the spec and return its closed record; raises BadInput before anything is written.
 
@@ -119,7 +122,7 @@ def execute(
     are left in good order.
 
     `rig` is another one than the spec's target names; it is closed here. `publish` is given the
-    estimate of every tick.
+    estimate of every tick, `watch` everything that the record is given, after it.
     """
     cv2.setNumThreads(1)  # search windows are small: handing them to threads costs more
     check_fit(spec.scenario)
@@ -139,8 +142,11 @@ def execute(
                 frame_rate_hz=spec.scenario.camera.rate_hz,
                 rerun=spec.rerun,
             )
+            sink = recorder if watch is None else WatchedSink(recorder, watch)
             try:
-                parts = make_parts(spec, TapedRig(rig, recorder.tape, ctrl_c.obey), recorder, law)
+                parts = make_parts(spec, TapedRig(rig, recorder.tape, ctrl_c.obey), sink, law)
+                if watch is not None:
+                    watch.began(parts)
                 session = Session(
                     spec.scenario, parts, parameters, board_hashes, progress, publish
                 )  # fmt: skip
