@@ -22,29 +22,11 @@ from hil.core.registries import LOCALISERS
 from hil.core.types import Pose, PoseMeasurement, wrap_pi
 from vision.camera import CameraModel
 from vision.camera_setup import camera_model
-from vision.disc_fit import Disc, Marks, Point, RimFitter
+from vision.disc_fit import Disc, Marks, RimFitter
+from vision.mark_search import CHROMA_BASIS, Centres, MarkSearch, Window
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
-Centres = tuple[Point, Point]  # front and rear mark, (x, y) m on their plane
-Window = tuple[int, int, int, int]  # left, top, right, bottom, px
-
-# The coarse image: marks are this wide in it at least, px.
-COARSE_DIAMETER_PX = 5.0
-# Rise of the mean response over a mark against its surroundings, DN: a third of a dim green mark's.
-COARSE_RISE_MIN_DN = 3.0
-# Blue, green and red as two chromas, orthonormal and zero for grey.
-CHROMA_BASIS = np.array(
-    [
-        [-math.sqrt(0.5), math.sqrt(0.5), 0.0],
-        [-math.sqrt(1 / 6), -math.sqrt(1 / 6), math.sqrt(2 / 3)],
-    ]
-)
-HUE_COS_MIN = 0.8  # 37 deg: coloured light, white balance and what lies beside the mark
-CANDIDATES_MAX = 10
-PAIRS_MAX = 12
-# How far off a coarse place may be, share of a mark's radius.
-COARSE_ERROR = 0.6
 
 # What is accepted.
 SHARE_MIN = 0.4
@@ -79,10 +61,10 @@ class MarkLocaliser:
         self._front_m, self._rear_m = ((m.x_m, m.y_m) for m in (marks.front, marks.rear))
         self._distance_m = math.dist(self._front_m, self._rear_m)
         weights = np.stack([_response(marks.front), _response(marks.rear)])
-        self._hues = (weights @ CHROMA_BASIS.T).astype(np.float32)
         self._rims = RimFitter(model, self._radius_m, self._height_m, weights)
-        self._diameter_px = self._smallest_diameter_px()
-        self._shrink = max(1, int(self._diameter_px / COARSE_DIAMETER_PX))
+        self._places = MarkSearch(
+            model, self._radius_m, self._height_m, self._distance_m, weights @ CHROMA_BASIS.T
+        )
 
     def locate(
         self, image_bgr: Image, predicted: Pose | None, search_radius_m: float
@@ -94,10 +76,10 @@ class MarkLocaliser:
         """
         if predicted is not None:
             centres = self._marks_of(predicted)
-            found, _ = self._measured(image_bgr, centres, wide=False)
+            window = self._window(image_bgr, centres, search_radius_m)
+            found = self._search(image_bgr, window)[0] if window else None
             if found is None:
-                window = self._window(image_bgr, centres, search_radius_m)
-                found = self._search(image_bgr, window)[0] if window else None
+                found, _ = self._measured(image_bgr, centres, wide=False)
             if found is not None:
                 return self._measurement(found, in_window=True)
         found, reason = self._search(image_bgr, (0, 0, image_bgr.shape[1], image_bgr.shape[0]))
@@ -126,18 +108,6 @@ class MarkLocaliser:
         pose = Pose(0.5 * (fx + rx) - (c * mx - s * my), 0.5 * (fy + ry) - (s * mx + c * my), theta)
         return pose, 0.5 * abs(math.dist(*centres_m) - self._distance_m)
 
-    def _smallest_diameter_px(self) -> float:
-        """Return how wide a mark is where the camera sees it smallest."""
-        model, least = self._model, math.inf
-        for u in (0.1, 0.5, 0.9):
-            for v in (0.1, 0.5, 0.9):
-                at = (u * model.width_px, v * model.height_px)
-                jacobian = model.floor_jacobian(*at, self._height_m)
-                if np.isfinite(jacobian).all():
-                    largest_m_px = float(np.linalg.norm(jacobian, 2))
-                    least = min(least, 2.0 * self._radius_m / largest_m_px)
-        return least if math.isfinite(least) else COARSE_DIAMETER_PX
-
     def _window(self, image: Image, centres_m: Centres, radius_m: float) -> Window | None:
         """Return the part of the image around predicted marks, None when out of view."""
         reach_m = radius_m + 2.0 * self._radius_m
@@ -149,66 +119,26 @@ class MarkLocaliser:
         height, width = image.shape[:2]
         left, top = np.maximum(px.min(axis=0).astype(int), 0).tolist()
         right, bottom = np.minimum(px.max(axis=0).astype(int) + 2, (width, height)).tolist()
-        least = 4 * self._shrink
+        least = 4 * self._places.grid_px
         return (left, top, right, bottom) if min(right - left, bottom - top) > least else None
 
     # -- coarse --------------------------------------------------------------------------------
 
     def _search(self, image: Image, window: Window) -> tuple[_Found | None, str]:
         """Return the robot in a part of the image, or None and the reason."""
-        candidates = self._candidates(image, window)
-        for name, places in zip(("front", "rear"), candidates, strict=True):
-            if not places:
-                return None, f"{name} mark not found"
-        pairs = self._pairs(*candidates)
-        if not pairs:
-            return None, "marks found, but none the robot's distance apart"
-        reason, best = "", None
+        pairs, reason = self._places.pairs(image, window)
+        best, why = None, ""
         for centres in pairs:
-            found, why = self._measured(image, centres, wide=True)
-            reason = reason or why
+            if best is not None and _near(centres, best, self._radius_m):
+                continue
+            found, refusal = self._measured(image, centres, wide=True)
+            why = why or refusal
             if found is None:
                 continue
             if best is not None and not _same(found, best):
                 return None, "two places look like the robot"
             best = best or found
-        return best, reason
-
-    def _candidates(self, image: Image, window: Window) -> list[list[Point]]:
-        """Return where each mark may be, m on the marks' plane, strongest first."""
-        left, top, right, bottom = window
-        part, shrink = image[top:bottom, left:right], self._shrink
-        if shrink > 1:
-            size = ((right - left) // shrink, (bottom - top) // shrink)
-            part = part[: size[1] * shrink, : size[0] * shrink]
-            part = np.asarray(cv2.resize(part, size, interpolation=cv2.INTER_AREA), np.uint8)
-        chroma = cv2.transform(part.astype(np.float32), CHROMA_BASIS)
-        wide = math.ceil(self._diameter_px / shrink) | 1
-        # Against its surroundings, so that a coloured floor is not a mark.
-        mean = cv2.blur(chroma, (wide, wide), borderType=cv2.BORDER_REPLICATE)
-        about = cv2.blur(chroma, (3 * wide, 3 * wide), borderType=cv2.BORDER_REPLICATE)
-        chroma = cv2.subtract(mean, about)
-        rise = cv2.transform(chroma, self._hues)
-        highest = cv2.dilate(rise, np.ones((wide, wide), np.uint8))
-        v, u, mark = np.nonzero((rise == highest) & (rise > COARSE_RISE_MIN_DN))
-        strength = rise[v, u, mark]
-        own_hue = strength > HUE_COS_MIN * np.hypot(*chroma[v, u].T)
-        v, u, mark, strength = v[own_hue], u[own_hue], mark[own_hue], strength[own_hue]
-        order = np.argsort(-strength, kind="stable")
-        px = np.column_stack((u, v))[order] * shrink + (0.5 * (shrink - 1) + np.array((left, top)))
-        own = [px[mark[order] == index][:CANDIDATES_MAX].tolist() for index in (0, 1)]
-        return [[self._model.floor_point(u, v, self._height_m) for u, v in at] for at in own]
-
-    def _pairs(self, front: list[Point], rear: list[Point]) -> list[Centres]:
-        """Return pairs about the robot's distance apart, likeliest first."""
-        limit_m = 2.0 * COARSE_ERROR * self._radius_m
-        ranked = [
-            (i + j, (f, r))
-            for i, f in enumerate(front)
-            for j, r in enumerate(rear)
-            if abs(math.dist(f, r) - self._distance_m) < limit_m
-        ]
-        return [pair for _, pair in sorted(ranked)[:PAIRS_MAX]]
+        return best, why or reason
 
     # -- fine ----------------------------------------------------------------------------------
 
@@ -279,6 +209,12 @@ class MarkLocaliser:
                 "window": float(in_window),
             },
         )
+
+
+def _near(centres_m: Centres, found: _Found, within_m: float) -> bool:
+    """Return whether a hypothesis is the one already measured."""
+    pairs = zip(centres_m, found.centres_m, strict=True)
+    return all(math.dist(a, b) < within_m for a, b in pairs)
 
 
 def _same(one: _Found, other: _Found) -> bool:
