@@ -35,6 +35,7 @@ Reach = tuple[float, float]
 WIDE, NEAR, FINE = (0.55, 0.15), (0.35, 0.15), (0.18, 0.3)
 REACH_MIN_PX = 1.6
 STEPS_MAX = 2
+BLURRED_SHARE = 0.8  # of the step seen by long profiles, where a blurred edge fills short ones
 SETTLED_PX = 0.2  # a step ends within a few % of its length of the answer
 CELL_PX = 8.0
 # A ray counts when its step is this share of the disc's typical one, and its edge within the profile.
@@ -97,13 +98,15 @@ Shapes = tuple[_Shape, _Shape]
 class _Edges:
     """Edges found along the profiles of both discs, (2, RAYS), and whether each can count.
 
-    `colours` is (2, RAYS, 3 samples); `typical` the response of the discs, (2,).
+    `colours` is (2, RAYS, 3 samples); `typical` the response of the discs, (2,); `rise_dn` that
+    from outside to inside, (2, RAYS).
     """
 
     colours: NDArray[np.float32]
     shift_px: Array
     usable: Mask
     typical: Array
+    rise_dn: NDArray[np.float32]
 
 
 class RimFitter:
@@ -135,14 +138,16 @@ class RimFitter:
         disc is out of view or has no edge.
         """
         centres_px = [self._model.project_point(x, y, self._height_m) for x, y in centres_m]
-        found = None
-        for reach in (WIDE, NEAR, FINE) if wide else (NEAR, FINE):
-            found = self._settled(image, centres_px, reach)
-            if found is None:
+        if wide:
+            rough = self._settled(image, centres_px, WIDE)
+            if rough is None:
                 return None
-            centres_px = found[0]
-        assert found is not None
-        return self._discs(*found)
+            centres_px = rough[0]
+        near = self._settled(image, centres_px, NEAR)
+        if near is None:
+            return None
+        fine = self._settled(image, near[0], FINE)
+        return None if fine is None else self._discs(*(near if _blurred(near[4], fine[4]) else fine))
 
     def _settled(
         self, image: Image, centres_px: list[Point], reach: Reach
@@ -242,7 +247,7 @@ class RimFitter:
             within = (u >= 0.0) & (u <= width - 1.0) & (v >= 0.0) & (v <= height - 1.0)
             usable &= within.all(axis=1).reshape(2, RAYS)
         reach = np.array([[shape.reach_px] for shape in shapes])
-        return _Edges(colours.reshape(2, RAYS, -1), swing * reach, usable, typical)
+        return _Edges(colours.reshape(2, RAYS, -1), swing * reach, usable, typical, rise)
 
     def _discs(
         self, centres_px: list[Point], shapes: Shapes, move: Array, keep: Mask, edges: _Edges
@@ -287,6 +292,12 @@ def _sums(samples: int, level: int) -> NDArray[np.float32]:
     between[:] = 1.0 / (len(between) - 1)
     between[[0, -1]] *= 0.5
     return sums
+
+
+def _blurred(near: _Edges, fine: _Edges) -> bool:
+    """Return whether blur reaches the ends of the short profiles: they lose much of the step."""
+    kept = np.sort(fine.rise_dn / np.maximum(near.rise_dn, 1.0), axis=1)[:, RAYS // 8]
+    return bool(kept.min() < BLURRED_SHARE)
 
 
 def _robust(

@@ -35,6 +35,7 @@ Image = NDArray[np.uint8]
 Colour = tuple[float, float, float]
 
 INSTANTS = 9
+PLATE_ROOM_M = 0.1  # of the plate beyond the marks' centres, both ends together
 RED, GREEN, BLUE = (0.07, 0.06, 0.62), (0.12, 0.42, 0.08), (0.55, 0.12, 0.05)
 VIEWS = {
     "ceiling": CameraPoseConfig(eye_m=(0.0, 0.0, 2.4), target_m=(0.0, 0.0, 0.0)),
@@ -111,10 +112,11 @@ def camera_of(
         "gradient_ratio": 0.0, "read_noise_dn": 0.0, "full_well_e": 1e9, "blur_px": 0.0,
         "clutter": (*condition.scene.clutter, *clutter), "bars": (*condition.scene.bars, *cover),
     })  # fmt: skip
+    marks = marks or MarksConfig()
+    look = RobotLookConfig(tag=tag, plate_length_m=marks.front.x_m - marks.rear.x_m + PLATE_ROOM_M)
     return CameraConfig(
         width_px=size_px[0], height_px=size_px[1], pose=VIEWS[view], scene=scene,
-        exposure_s=condition.exposure_s, marks=marks or MarksConfig(),
-        robot_look=RobotLookConfig(tag=tag),
+        exposure_s=condition.exposure_s, marks=marks, robot_look=look,
     )  # fmt: skip
 
 

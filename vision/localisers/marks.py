@@ -28,6 +28,9 @@ from vision.mark_search import CHROMA_BASIS, Centres, MarkSearch, Window
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
+# The best hypotheses are measured with long profiles too: a covered mark's place may be far off.
+WIDE_TRIES = 3
+
 # What is accepted.
 SHARE_MIN = 0.4
 GROWTH_MAX = 0.12
@@ -128,10 +131,12 @@ class MarkLocaliser:
         """Return the robot in a part of the image, or None and the reason."""
         pairs, reason = self._places.pairs(image, window)
         best, why = None, ""
-        for centres in pairs:
+        for index, centres in enumerate(pairs):
             if best is not None and _near(centres, best, self._radius_m):
                 continue
-            found, refusal = self._measured(image, centres, wide=True)
+            found, refusal = self._measured(image, centres, wide=False)
+            if found is None and index < WIDE_TRIES:
+                found, _ = self._measured(image, centres, wide=True)
             why = why or refusal
             if found is None:
                 continue
