@@ -19,17 +19,15 @@ from numpy.typing import NDArray
 
 from hil.config.camera import CameraConfig, MarkConfig, MarksConfig
 from hil.core.registries import LOCALISERS
-from hil.core.types import Pose, PoseMeasurement, wrap_pi
+from hil.core.types import Pose, PoseMeasurement
 from vision.camera import CameraModel
 from vision.camera_setup import camera_model
 from vision.disc_fit import Disc, Marks, RimFitter
 from vision.mark_search import CHROMA_BASIS, Centres, MarkSearch, Window
+from vision.pose_fit import weighted_pose
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
-
-# The best hypotheses are measured with long profiles too: a covered mark's place may be far off.
-WIDE_TRIES = 3
 
 # What is accepted.
 SHARE_MIN = 0.4
@@ -38,8 +36,8 @@ RESIDUAL_MAX = 0.09  # of the radius
 RESIDUAL_FREE_PX = 0.25  # sensor noise
 DISTANCE_TOLERANCE = 0.04
 
-# An edge fit is never better than this: lens model, interpolation, light within a profile.
-SIGMA_MIN_PX = 0.01
+# How many degrees of freedom the discs' own claims are worth against that of their distance.
+MISFIT_FREEDOM = 4.0
 QUALITY_RESIDUAL = 0.06  # of the radius
 SAME_PLACE_M = 0.02
 
@@ -82,7 +80,7 @@ class MarkLocaliser:
             window = self._window(image_bgr, centres, search_radius_m)
             found = self._search(image_bgr, window)[0] if window else None
             if found is None:
-                found, _ = self._measured(image_bgr, centres, wide=False)
+                found, _ = self._measured(image_bgr, centres)
             if found is not None:
                 return self._measurement(found, in_window=True)
         found, reason = self._search(image_bgr, (0, 0, image_bgr.shape[1], image_bgr.shape[0]))
@@ -100,16 +98,6 @@ class MarkLocaliser:
             for x, y in (self._front_m, self._rear_m)
         )
         return front, rear
-
-    def _pose_of(self, centres_m: Centres) -> tuple[Pose, float]:
-        """Return the pose that fits both marks best, and the RMS of what is left."""
-        (fx, fy), (rx, ry) = centres_m
-        (bfx, bfy), (brx, bry) = self._front_m, self._rear_m
-        theta = wrap_pi(math.atan2(fy - ry, fx - rx) - math.atan2(bfy - bry, bfx - brx))
-        c, s = math.cos(theta), math.sin(theta)
-        mx, my = 0.5 * (bfx + brx), 0.5 * (bfy + bry)
-        pose = Pose(0.5 * (fx + rx) - (c * mx - s * my), 0.5 * (fy + ry) - (s * mx + c * my), theta)
-        return pose, 0.5 * abs(math.dist(*centres_m) - self._distance_m)
 
     def _window(self, image: Image, centres_m: Centres, radius_m: float) -> Window | None:
         """Return the part of the image around predicted marks, None when out of view."""
@@ -131,12 +119,10 @@ class MarkLocaliser:
         """Return the robot in a part of the image, or None and the reason."""
         pairs, reason = self._places.pairs(image, window)
         best, why = None, ""
-        for index, centres in enumerate(pairs):
+        for centres in pairs:
             if best is not None and _near(centres, best, self._radius_m):
                 continue
-            found, refusal = self._measured(image, centres, wide=False)
-            if found is None and index < WIDE_TRIES:
-                found, _ = self._measured(image, centres, wide=True)
+            found, refusal = self._measured(image, centres)
             why = why or refusal
             if found is None:
                 continue
@@ -147,11 +133,9 @@ class MarkLocaliser:
 
     # -- fine ----------------------------------------------------------------------------------
 
-    def _measured(
-        self, image: Image, centres_m: Centres, *, wide: bool
-    ) -> tuple[_Found | None, str]:
+    def _measured(self, image: Image, centres_m: Centres) -> tuple[_Found | None, str]:
         """Return the marks near two guessed centres, or None and why they are not the robot's."""
-        discs = self._rims.fit(image, centres_m, wide=wide)
+        discs = self._rims.fit(image, centres_m)
         if discs is None:
             return None, "marks have no rim"
         for name, disc in zip(("front", "rear"), discs, strict=True):
@@ -187,18 +171,20 @@ class MarkLocaliser:
     def _measurement(self, found: _Found, *, in_window: bool) -> PoseMeasurement:
         """Return pose, quality (1: both rims whole and sharp) and claimed deviations."""
         front, rear = found.discs
-        pose, residual_m = self._pose_of(found.centres_m)
-        variance = sum(
-            (disc.sigma_px**2 + SIGMA_MIN_PX**2) * (self._radius_m / disc.radius_px) ** 2
-            for disc in found.discs
+        pose, covariance, misfit2 = weighted_pose(
+            (self._front_m, self._rear_m), found.centres_m, [self._spread(d) for d in found.discs]
         )
+        # Marks further off their distance than they claim: both claims are too small.
+        covariance *= (MISFIT_FREEDOM + misfit2) / (MISFIT_FREEDOM + 1.0)
+        residual_m = 0.5 * abs(found.gap_m)
         sharp = max(disc.residual_px / disc.radius_px for disc in found.discs) / QUALITY_RESIDUAL
         misfit = found.gap_m / (DISTANCE_TOLERANCE * self._distance_m)
         return PoseMeasurement(
             pose,
             quality=min(front.share, rear.share) * math.exp(-0.5 * sharp**2 - misfit**2),
-            sigma_xy_m=math.sqrt(0.25 * variance + residual_m**2),
-            sigma_theta_rad=math.sqrt(variance) / self._distance_m,
+            sigma_xy_m=math.sqrt(0.5 * (covariance[0, 0] + covariance[1, 1])),
+            sigma_theta_rad=math.sqrt(covariance[2, 2]),
+            covariance=tuple(covariance[np.triu_indices(3)].tolist()),
             details={
                 "front_u_px": front.u_px,
                 "front_v_px": front.v_px,
@@ -214,6 +200,13 @@ class MarkLocaliser:
                 "window": float(in_window),
             },
         )
+
+    def _spread(self, disc: Disc) -> Array:
+        """Return the covariance of a mark's place on its plane, (2, 2), m^2."""
+        uu, uv, vv = disc.covariance_px2
+        slope = self._model.floor_jacobian(disc.u_px, disc.v_px, self._height_m)
+        spread: Array = slope @ np.array([[uu, uv], [uv, vv]]) @ slope.T
+        return spread
 
 
 def _near(centres_m: Centres, found: _Found, within_m: float) -> bool:
