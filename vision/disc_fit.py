@@ -27,6 +27,11 @@ Point = tuple[float, float]
 Marks = tuple["Disc", "Disc"]
 
 STEPS_MAX = 6
+# Before them the centroid of the response, twice: of points in rings up to 1.5 radii.
+CENTROIDS = 2
+POLAR_RAYS = 16
+POLAR_RADII = np.array((0.3, 0.6, 0.85, 1.05, 1.25, 1.5))
+CENTROID_LEVEL = 0.4  # of the way from the surroundings to the highest response
 SETTLED_PX = 0.03  # a step this short ends the fit; after one longer than that all rays count again
 REKEEP_PX = 0.5
 CELL_PX = 8.0
@@ -70,7 +75,8 @@ class _Shape:
 
     `maps` is (2 axes, RAYS, samples) px from the image of the centre; `rows`, (RAYS, 3), how far an
     edge moves along its profile per px in u, per px in v and per unit of growth; `room_px` what the
-    profiles need about the centre; `step_px` how far apart their samples are.
+    profiles need about the centre; `step_px` how far apart their samples are; `polar` are points
+    all over the disc and around it, (N, 2) px from its centre, ring by ring.
     """
 
     radius_px: float
@@ -78,6 +84,7 @@ class _Shape:
     room_px: float
     maps: NDArray[np.float32]
     rows: Array
+    polar: NDArray[np.float32]
 
 
 Shapes = tuple[_Shape, _Shape]
@@ -119,6 +126,7 @@ class RimFitter:
         self._circle_m = np.vstack((circle, (0.0, 0.0)))
         ray = np.arange(RAYS)
         self._after, self._before = (ray + 1) % RAYS, (ray - 1) % RAYS
+        self._polar_area = np.repeat(POLAR_RADII, POLAR_RAYS).astype(np.float32)
         self._shapes: dict[tuple[int, int], _Shape | None] = {}
         middle = self._rim(0.5 * model.width_px, 0.5 * model.height_px)
         self._profiles = Profiles(middle[2] if middle[2] > 1.0 else 1.0)
@@ -129,6 +137,11 @@ class RimFitter:
         The guess may be off by half of the radius. None where a disc is out of view or has no edge.
         """
         centres_px = [self._model.project_point(x, y, self._height_m) for x, y in centres_m]
+        for _ in range(CENTROIDS):
+            moved = self._centred(image, centres_px)
+            if moved is None:
+                return None
+            centres_px = moved
         keep = found = None
         for _ in range(STEPS_MAX):
             found = self._step(image, centres_px, keep)
@@ -141,6 +154,27 @@ class RimFitter:
                 keep = None
         assert found is not None
         return self._discs(found)
+
+    def _centred(self, image: Image, centres_px: list[Point]) -> list[Point] | None:
+        """Return the centroids of the response about the centres: what the fit starts from.
+
+        A guess leaves next to nothing of its own error in them, and so none in the answer.
+        """
+        front, rear = (self._shape(u, v) for u, v in centres_px)
+        if front is None or rear is None:
+            return None
+        arms = np.stack((front.polar, rear.polar))
+        at = (arms + np.array(centres_px, np.float32)[:, None]).reshape(2, -1, 2)
+        colours = cv2.remap(
+            image, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        )
+        response = (colours.astype(np.float32) @ self._weights)[..., 0]
+        base = np.median(response[:, -POLAR_RAYS:], axis=1, keepdims=True)
+        level = base + CENTROID_LEVEL * (response.max(axis=1, keepdims=True) - base)
+        weight = np.maximum(response - level, 0.0) * self._polar_area
+        weight /= np.maximum(weight.sum(axis=1, keepdims=True), 1e-6)
+        moves = (weight[:, None] @ arms)[:, 0].tolist()
+        return [(u + du, v + dv) for (u, v), (du, dv) in zip(centres_px, moves, strict=True)]
 
     def _step(self, image: Image, centres_px: list[Point], keep: Mask | None) -> _Fit | None:
         front, rear = (self._shape(u, v) for u, v in centres_px)
@@ -200,7 +234,10 @@ class RimFitter:
         maps = arms.T[..., None] + normals.T[..., None] * steps
         room = float(np.abs(arms).max() + steps[-1]) + 1.0
         rows = np.column_stack((normals, np.sum(normals * arms, axis=1)))
-        return _Shape(radius, step_px, room, maps.astype(np.float32), rows)
+        polar = (POLAR_RADII[:, None, None] * arms[:: RAYS // POLAR_RAYS]).reshape(-1, 2)
+        return _Shape(
+            radius, step_px, room, maps.astype(np.float32), rows, polar.astype(np.float32)
+        )
 
     def _edges(
         self, image: Image, centres_px: list[Point], shapes: Shapes
@@ -224,15 +261,17 @@ class RimFitter:
         ):
             within = (u >= 0.0) & (u <= width - 1.0) & (v >= 0.0) & (v <= height - 1.0)
             usable = usable & within.all(axis=1).reshape(2, RAYS)
-        return colours.reshape(2, RAYS, -1), edges, usable
+        return colours.reshape(2, RAYS, samples, 3), edges, usable
 
     def _discs(self, fit: _Fit) -> Marks:
         """Return the figures of both fitted discs."""
-        seen = np.matmul(fit.keep[:, None].astype(np.float32), fit.colours)[:, 0]
-        dark, bright = seen[:, -6:].sum(axis=1).tolist(), seen[:, :6].sum(axis=1).tolist()
+        colours = fit.colours.sum(axis=-1)
+        ground, own = colours[..., self._profiles.ground], colours[..., self._profiles.own]
+        ratio = ground.sum(axis=-1) / np.maximum(own.sum(axis=-1), 1.0)
         covariances = _covariances(fit)
         front, rear = (
-            self._disc(fit, i, covariances[i], dark[i] / max(bright[i], 1.0)) for i in (0, 1)
+            self._disc(fit, i, covariances[i], float(np.median(ratio[i][fit.keep[i]])))
+            for i in (0, 1)
         )
         return front, rear
 

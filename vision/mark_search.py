@@ -55,8 +55,12 @@ DISTANCE_LIMIT, DISTANCE_SIGMA = 1.2, 0.3
 # What a hypothesis loses: a rim half wrong, ground as bright as the mark, a hue 37 deg off.
 SHAPE_LOSS, GROUND_LOSS, HUE_LOSS = 8.0, 2.0, 10.0
 SHAPE_MIN = 0.3
-# Within this of the best score a hypothesis must be refuted before the best is believed.
-CENTROID_STEPS = 2
+CENTROID_STEPS = 1
+# A peak must fall to a half this far from it, in 7 of 8 directions at least.
+_AROUND = np.rint(
+    7.0 * np.stack((np.cos(np.arange(8) * np.pi / 4), np.sin(np.arange(8) * np.pi / 4)), axis=1)
+).astype(np.int64)
+AROUND_MIN = 7
 
 
 def _disc_points() -> tuple[Array, Array, Array]:
@@ -140,8 +144,14 @@ class MarkSearch:
     def pairs(self, image: Image, window: Window) -> tuple[list[Centres], str]:
         """Return hypotheses (front, rear centre in m), likeliest first; if none, the reason."""
         found: list[list[Places]] = [[], []]
+        left, top = (edge // self.grid_px * self.grid_px for edge in window[:2])
+        picture, shrink = image[top : window[3], left : window[2]], 1
         for level in self._levels:
-            for mark, places in enumerate(self._places(image, window, level)):
+            while shrink < level.shrink:
+                picture, shrink = _halved(picture), 2 * shrink
+            if min(picture.shape[:2]) < 4:
+                break
+            for mark, places in enumerate(self._places(picture, (left, top), level)):
                 found[mark].append(places)
         front, rear = (_merged(places) for places in found)
         for name, places in (("front", front), ("rear", rear)):
@@ -161,20 +171,18 @@ class MarkSearch:
             for f, r in zip(front.centres_m[first], rear.centres_m[second], strict=True)
         ]
 
-    def _places(self, image: Image, window: Window, level: _Level) -> tuple[Places, Places]:
-        """Return the places of both marks in one shrunk picture of a window."""
-        shrink, margin = level.shrink, (ABOUT_PX // 2 + 1) * level.shrink
-        left, right = window[0] // shrink * shrink, window[2]
-        top = max(window[1], level.rows[0] - margin) // shrink * shrink
-        bottom = min(window[3], level.rows[1] + margin)
-        size = ((right - left) // shrink, (bottom - top) // shrink)
-        if min(size) < 4:
+    def _places(
+        self, picture: Image, corner_px: tuple[int, int], level: _Level
+    ) -> tuple[Places, Places]:
+        """Return the places of both marks in the rows of a shrunk picture that are a level's."""
+        shrink, margin = level.shrink, ABOUT_PX // 2 + 1
+        first, last = ((row - corner_px[1]) // shrink for row in level.rows)
+        first, last = max(first - margin, 0), min(last + margin, len(picture))
+        if last - first < 4:
             return NONE, NONE
-        part = image[top : top + size[1] * shrink, left : left + size[0] * shrink]
-        if shrink > 1:
-            part = np.asarray(cv2.resize(part, size, interpolation=cv2.INTER_AREA), np.uint8)
+        part = picture[first:last]
         at, mark, cosine = self._peaks(part)
-        origin = np.array((left, top)) + 0.5 * (shrink - 1)
+        origin = np.array(corner_px) + 0.5 * (shrink - 1) + np.array((0, first * shrink))
         front, rear = (
             self._examined(part, at[mark == k], cosine[mark == k], k, shrink, origin)
             for k in (0, 1)
@@ -190,11 +198,13 @@ class MarkSearch:
         chroma = cv2.subtract(mean, about)
         rise = np.asarray(cv2.transform(chroma, self._hues), np.float32)
         highest = cv2.dilate(rise, np.ones((MEAN_PX, MEAN_PX), np.uint8))
-        v, u, mark = np.nonzero((rise == highest) & (rise > RISE_MIN_DN))
-        strength = rise[v, u, mark]
+        flat = np.flatnonzero((rise == highest) & (rise > RISE_MIN_DN))
+        cell, mark = np.divmod(flat, 2)
+        v, u = np.divmod(cell, rise.shape[1])
+        strength = rise.ravel()[flat]
         own = np.asarray(chroma, np.float32)[v, u]
         cosine = strength / np.maximum(np.hypot(own[:, 0], own[:, 1]), 1e-6)
-        good = cosine > HUE_COS_MIN
+        good = (cosine > HUE_COS_MIN) & _round(rise, u, v, mark, strength)
         at, mark, strength, cosine = (
             np.column_stack((u, v))[good], mark[good], strength[good], cosine[good],
         )  # fmt: skip
@@ -275,6 +285,25 @@ class _Sampler:
     def brightness(self, px: Array, affine: Array, points: Array) -> Floats:
         """Return the mean of the colours, (N, P)."""
         return np.asarray(self._colours(px, affine, points).mean(axis=-1), np.float32)
+
+
+def _halved(picture: Image) -> Image:
+    """Return a picture of half the size; an odd last row or column falls away."""
+    size = (picture.shape[1] // 2, picture.shape[0] // 2)
+    even = picture[: 2 * size[1], : 2 * size[0]]
+    return np.asarray(cv2.resize(even, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _round(
+    rise: Floats, u: NDArray[np.int64], v: NDArray[np.int64], mark: NDArray[np.int64],
+    strength: Floats,
+) -> NDArray[np.bool_]:  # fmt: skip
+    """Return which peaks fall off in nearly all directions: no lines, no edges of large things."""
+    height, width = rise.shape[:2]
+    at_v = np.clip(v[:, None] + _AROUND[:, 1], 0, height - 1)
+    at_u = np.clip(u[:, None] + _AROUND[:, 0], 0, width - 1)
+    low = rise[at_v, at_u, mark[:, None]] < 0.5 * strength[:, None]
+    return np.asarray(low.sum(axis=1) >= AROUND_MIN, np.bool_)
 
 
 def _merged(places: list[Places]) -> Places:

@@ -53,7 +53,7 @@ class Profiles:
     """The sums that turn profiles of both discs into edges; `radius_px` is that of a typical disc.
 
     A profile has 2 `half` + 1 samples about a px apart; `edge` of them, on each side of its middle,
-    are the longest reach.
+    are the longest reach; `own` and `ground` are those next to the rim, inside and outside.
     """
 
     def __init__(self, radius_px: float) -> None:
@@ -66,11 +66,14 @@ class Profiles:
         apart = np.abs((ray[:, None] - ray + RAYS // 2) % RAYS - RAYS // 2)
         self._smooth = ((apart <= LEVEL_RAYS // 2) / LEVEL_RAYS).astype(np.float32)
         self._about = ((apart <= GAIN_RAYS // 2) / GAIN_RAYS).astype(np.float32)
+        self.ground = slice(self.half + self._edge[0] + 1, self.half + self._edge[0] + 3)
+        self.own = slice(self.half - self._edge[0] - 2, self.half - self._edge[0])
         # Levels are shared by neighbouring rays, which does not average them over a whole disc.
         self._scatter = np.array([
             2.0 * e * math.sqrt(0.5 / e + 0.5 / n)
             for e, n in zip(self._edge, self._level, strict=True)
         ], np.float32)[:, None, None]  # fmt: skip
+        self._all = np.arange(2 * RAYS)
         self._reach = np.array(self._edge, np.float32)[:, None, None]
 
     def _sums_of(self) -> Floats:
@@ -97,19 +100,17 @@ class Profiles:
             np.maximum(rise[:, 0] @ self._about, 1.0),
             ((swing[:, 1] - swing[:, 2]) * (0.5 * self._reach)) @ self._about,
         )
-        gain = np.clip(gain, GAIN_MIN, 1.0)
+        gain = np.minimum(np.maximum(gain, GAIN_MIN), 1.0)
         noise = self._scatter / level
-        best = np.argmax(gain / noise, axis=0)[None]
-
-        def of(values: Floats) -> Floats:
-            return np.asarray(np.take_along_axis(values, best, axis=0)[0], np.float32)
-
-        step, own, offset = of(rise[:, 0]), of(inside), of(swing[:, 0])
+        best = np.argmax(gain / noise, axis=0).ravel()
+        of = np.stack((rise[:, 0], inside, swing[:, 0] * self._reach, gain, noise))
+        of = of.reshape(5, len(REACHES), 2 * RAYS)[:, best, self._all].reshape(5, 2, RAYS)
+        step, own, shift, gain, noise = of
         typical = np.sort(own, axis=1)[:, (3 * RAYS) // 4]
         least = np.maximum(STEP_SHARE * typical, RESPONSE_MIN_DN)[:, None]
-        usable = (np.minimum(step, own) > least) & (np.abs(offset) < SHIFT_SHARE)
-        reach = self._reach[best[0], 0, 0]
-        return Edges(offset * reach, of(gain), of(noise), usable, typical)
+        room = (SHIFT_SHARE * self._reach.ravel())[best].reshape(2, RAYS)
+        usable = (np.minimum(step, own) > least) & (np.abs(shift) < room)
+        return Edges(shift, gain, noise, usable, typical)
 
 
 def _better_side(level: Floats, gain: Floats) -> tuple[Floats, Floats]:
@@ -117,10 +118,9 @@ def _better_side(level: Floats, gain: Floats) -> tuple[Floats, Floats]:
 
     Blur is the same on both sides; what covers one side is no blur.
     """
-    across = RAYS // 2
-    other = np.roll(level, across, axis=-1)
-    here = level >= other
-    return (
-        np.where(here, level, other),
-        np.where(here, gain, np.roll(gain, across, axis=-1)),
+    level_across, gain_across = (
+        values.reshape(-1, 2, 2, RAYS // 2)[:, :, ::-1].reshape(values.shape)
+        for values in (level, gain)
     )
+    here = level >= level_across
+    return np.where(here, level, level_across), np.where(here, gain, gain_across)

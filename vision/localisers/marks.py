@@ -77,10 +77,10 @@ class MarkLocaliser:
         """
         if predicted is not None:
             centres = self._marks_of(predicted)
-            window = self._window(image_bgr, centres, search_radius_m)
-            found = self._search(image_bgr, window)[0] if window else None
+            found, _ = self._measured(image_bgr, centres)
             if found is None:
-                found, _ = self._measured(image_bgr, centres)
+                window = self._window(image_bgr, centres, search_radius_m)
+                found = self._search(image_bgr, window)[0] if window else None
             if found is not None:
                 return self._measurement(found, in_window=True)
         found, reason = self._search(image_bgr, (0, 0, image_bgr.shape[1], image_bgr.shape[0]))
