@@ -36,6 +36,7 @@ SETTLED_PX = 0.03  # a step this short ends the fit; after one longer than that 
 REKEEP_PX = 0.5
 CELL_PX = 8.0
 OUTLIER_SIGMAS = 3.0
+BESIDE_MIN = 3  # of five rays side by side, more of which must have an edge for that in the middle
 EDGE_SIGMA_MIN_PX = 0.05
 # Doubt of the radius before the fit, relative, as a pull towards the known one.
 RADIUS_SIGMA = 0.02
@@ -44,6 +45,7 @@ RADIUS_PULL = (0.15 / RADIUS_SIGMA) ** 2
 _TURNS = np.outer(np.arange(RAYS) * (2.0 * np.pi / RAYS), (2, 3, 4))
 ROUND = np.hstack((np.cos(_TURNS), np.sin(_TURNS)))
 NOISE_RATIO = 1.3
+NOISE_SLOPE = 0.25  # the more so, the more of it is shared by neighbouring rays
 # What no residual shows: lens model, interpolation, light within a profile.
 FREE_RATIO = 0.001  # of the radius
 FREE_PX = 0.004
@@ -126,6 +128,7 @@ class RimFitter:
         self._circle_m = np.vstack((circle, (0.0, 0.0)))
         ray = np.arange(RAYS)
         self._after, self._before = (ray + 1) % RAYS, (ray - 1) % RAYS
+        self._beside = (ray[:, None] + np.arange(-2, 3)) % RAYS
         self._polar_area = np.repeat(POLAR_RADII, POLAR_RAYS).astype(np.float32)
         self._shapes: dict[tuple[int, int], _Shape | None] = {}
         middle = self._rim(0.5 * model.width_px, 0.5 * model.height_px)
@@ -169,7 +172,7 @@ class RimFitter:
             image, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
         )
         response = (colours.astype(np.float32) @ self._weights)[..., 0]
-        base = np.median(response[:, -POLAR_RAYS:], axis=1, keepdims=True)
+        base = np.sort(response[:, -POLAR_RAYS:], axis=1)[:, POLAR_RAYS // 2, None]
         level = base + CENTROID_LEVEL * (response.max(axis=1, keepdims=True) - base)
         weight = np.maximum(response - level, 0.0) * self._polar_area
         weight /= np.maximum(weight.sum(axis=1, keepdims=True), 1e-6)
@@ -261,6 +264,10 @@ class RimFitter:
         ):
             within = (u >= 0.0) & (u <= width - 1.0) & (v >= 0.0) & (v <= height - 1.0)
             usable = usable & within.all(axis=1).reshape(2, RAYS)
+        if not usable.all():
+            # Levels of a ray beside a covered one are half the cover's.
+            beside = usable[:, self._beside].sum(axis=2)
+            usable = usable & (beside > BESIDE_MIN)
         return colours.reshape(2, RAYS, samples, 3), edges, usable
 
     def _discs(self, fit: _Fit) -> Marks:
@@ -270,7 +277,7 @@ class RimFitter:
         ratio = ground.sum(axis=-1) / np.maximum(own.sum(axis=-1), 1.0)
         covariances = _covariances(fit)
         front, rear = (
-            self._disc(fit, i, covariances[i], float(np.median(ratio[i][fit.keep[i]])))
+            self._disc(fit, i, covariances[i], _median(ratio[i][fit.keep[i]]))
             for i in (0, 1)
         )
         return front, rear
@@ -287,6 +294,10 @@ class RimFitter:
         )  # fmt: skip
 
 
+def _median(values: NDArray[np.float32]) -> float:
+    return float(np.sort(values)[len(values) // 2])
+
+
 def _covariances(fit: _Fit) -> Array:
     """Return the covariances of both centres, (2, 2, 2), px^2.
 
@@ -301,8 +312,9 @@ def _covariances(fit: _Fit) -> Array:
     count = fit.keep.sum(axis=1)
     slow = np.sum((rest @ ROUND) ** 2, axis=1) * (2.0 / ROUND.shape[1]) / count
     fast = np.sum(rest * rest, axis=1) / np.maximum(count - 3, 1)
-    own = np.maximum(NOISE_RATIO * slow, fast)
-    variance = 0.5 * (own + own.mean())
+    own = NOISE_RATIO * np.maximum(slow, fast)
+    own *= np.maximum(slow / np.maximum(fast, 1e-12), 1.0) ** NOISE_SLOPE
+    variance = np.maximum(own, 0.5 * (own + own.mean()))
     radius = np.array([shape.radius_px for shape in fit.shapes])
     free = (FREE_RATIO * radius) ** 2 + FREE_PX**2
     centre = np.linalg.inv(normal)[:, :2, :2]

@@ -32,6 +32,7 @@ Image = NDArray[np.uint8]
 # What is accepted.
 SHARE_MIN = 0.4
 GROWTH_MAX = 0.12
+GROWTH_DOUBT = 0.5  # more where the rim is rough: noise, blur longer than the profiles
 RESIDUAL_MAX = 0.09  # of the radius
 RESIDUAL_FREE_PX = 0.25  # sensor noise
 DISTANCE_TOLERANCE = 0.04
@@ -49,6 +50,7 @@ class _Found:
     discs: Marks
     centres_m: Centres
     gap_m: float
+    spreads_m2: tuple[Array, Array]
 
 
 class MarkLocaliser:
@@ -145,20 +147,25 @@ class MarkLocaliser:
         at = self._model.floor_point
         front, rear = (at(disc.u_px, disc.v_px, self._height_m) for disc in discs)
         gap_m = math.dist(front, rear) - self._distance_m
-        if not abs(gap_m) <= DISTANCE_TOLERANCE * self._distance_m:
+        spreads = (self._spread(discs[0]), self._spread(discs[1]))
+        along = np.subtract(front, rear) / max(math.dist(front, rear), 1e-9)
+        doubt_m = 2.0 * math.sqrt(float(along @ (spreads[0] + spreads[1]) @ along))
+        most_m = DISTANCE_TOLERANCE * self._distance_m
+        if not abs(gap_m) <= most_m + min(doubt_m, most_m):
             own_mm = 1e3 * self._distance_m
             return (
                 None,
                 f"marks {own_mm + 1e3 * gap_m:.0f} mm apart, the robot's are {own_mm:.0f} mm",
             )
-        return _Found(discs, (front, rear), gap_m), ""
+        return _Found(discs, (front, rear), gap_m, spreads), ""
 
     def _refusal(self, disc: Disc) -> str:
         """Return why a disc cannot be a mark, "" when it can."""
         if disc.share < SHARE_MIN:
             return f"{disc.share:.0%} of its rim seen, limit {SHARE_MIN:.0%}"
-        if not abs(disc.growth) <= GROWTH_MAX:
-            return f"{1.0 + disc.growth:.2f} of its size, limit 1 +- {GROWTH_MAX:g}"
+        most = GROWTH_MAX + GROWTH_DOUBT * disc.residual_px / disc.radius_px
+        if not abs(disc.growth) <= most:
+            return f"{1.0 + disc.growth:.2f} of its size, limit 1 +- {most:.2f}"
         most_px = RESIDUAL_FREE_PX + RESIDUAL_MAX * disc.radius_px
         if not disc.residual_px <= most_px:
             return f"rim off by {disc.residual_px:.2f} px RMS, limit {most_px:.2f} px"
@@ -172,7 +179,7 @@ class MarkLocaliser:
         """Return pose, quality (1: both rims whole and sharp) and claimed deviations."""
         front, rear = found.discs
         pose, covariance, misfit2 = weighted_pose(
-            (self._front_m, self._rear_m), found.centres_m, [self._spread(d) for d in found.discs]
+            (self._front_m, self._rear_m), found.centres_m, found.spreads_m2
         )
         # Marks further off their distance than they claim: both claims are too small.
         covariance *= (MISFIT_FREEDOM + misfit2) / (MISFIT_FREEDOM + 1.0)
