@@ -28,6 +28,10 @@ class Pose:
     theta_rad: float
 
 
+# Upper triangle of a symmetric 3 x 3 matrix of (x_m, y_m, theta_rad): xx, xy, xt, yy, yt, tt.
+Covariance = tuple[float, float, float, float, float, float]
+
+
 @dataclass(frozen=True, slots=True)
 class PoseMeasurement:
     """What the localiser says of one frame.
@@ -45,7 +49,7 @@ class PoseMeasurement:
     sigma_xy_m: float = 0.001
     sigma_theta_rad: float = 0.005
     details: dict[str, float] = field(default_factory=dict)
-    covariance: tuple[float, float, float, float, float, float] | None = None
+    covariance: Covariance | None = None
 
 
 @dataclass(frozen=True, slots=True)
