@@ -45,7 +45,9 @@ RADIUS_PULL = (0.15 / RADIUS_SIGMA) ** 2
 _TURNS = np.outer(np.arange(RAYS) * (2.0 * np.pi / RAYS), (2, 3, 4))
 ROUND = np.hstack((np.cos(_TURNS), np.sin(_TURNS)))
 NOISE_RATIO = 1.3
-NOISE_SLOPE = 0.25  # the more so, the more of it is shared by neighbouring rays
+# The more so, the more of it is shared by neighbouring rays; that which varies twice may be blur.
+NOISE_SLOPE = 0.4
+ODD = [1, 2, 4, 5]
 # What no residual shows: lens model, interpolation, light within a profile.
 FREE_RATIO = 0.001  # of the radius
 FREE_PX = 0.004
@@ -310,10 +312,11 @@ def _covariances(fit: _Fit) -> Array:
     normal[:, 2, 2] += RADIUS_PULL
     rest = (fit.shift - (fit.rows @ fit.move[..., None])[..., 0]) * fit.keep
     count = fit.keep.sum(axis=1)
-    slow = np.sum((rest @ ROUND) ** 2, axis=1) * (2.0 / ROUND.shape[1]) / count
+    power = (rest @ ROUND) ** 2 * (2.0 / count[:, None])
+    slow, shared = power.mean(axis=1), power[:, ODD].mean(axis=1)
     fast = np.sum(rest * rest, axis=1) / np.maximum(count - 3, 1)
     own = NOISE_RATIO * np.maximum(slow, fast)
-    own *= np.maximum(slow / np.maximum(fast, 1e-12), 1.0) ** NOISE_SLOPE
+    own *= np.maximum(shared / np.maximum(fast, 1e-12), 1.0) ** NOISE_SLOPE
     variance = np.maximum(own, 0.5 * (own + own.mean()))
     radius = np.array([shape.radius_px for shape in fit.shapes])
     free = (FREE_RATIO * radius) ** 2 + FREE_PX**2

@@ -225,3 +225,24 @@ def frames(
         dx, dy, turn = (float(d) for d in rng.normal(0.0, PREDICTION_SIGMA))
         guess = Pose(pose.x_m + dx, pose.y_m + dy, pose.theta_rad + turn)
         yield Frame(develop(total, condition, rng), pose, guess)
+
+
+def coloured_floor(marks: MarksConfig) -> tuple[ClutterConfig, ...]:
+    """Return tape, a disc of the marks' size and a box in the marks' colours."""
+    front, rear = marks.front.colour, marks.rear.colour
+    return (
+        ClutterConfig(x_m=-0.35, y_m=-0.1, size_m=(marks.diameter_m,) * 2, colour=front),
+        _box(0.4, 0.1, (0.08, 0.08), rear, height_m=0.05),
+        _box(0.0, 0.5, (1.4, 0.02), front),
+        _box(-0.2, 0.15, (0.3, 0.015), rear, theta_rad=0.6),
+    )
+
+
+def _box(
+    x_m: float, y_m: float, size_m: tuple[float, float], colour: Colour,
+    height_m: float = 1e-4, theta_rad: float = 0.0,
+) -> ClutterConfig:  # fmt: skip
+    return ClutterConfig(
+        shape="box", x_m=x_m, y_m=y_m, size_m=size_m, height_m=height_m, theta_rad=theta_rad,
+        colour=colour,
+    )  # fmt: skip
