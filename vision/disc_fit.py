@@ -29,6 +29,7 @@ Marks = tuple["Disc", "Disc"]
 STEPS_MAX = 6
 # Before them the centroid of the response, twice: of points in rings up to 1.5 radii.
 CENTROIDS = 2
+CENTRED_PX = 1.0  # after a move shorter than that one is enough
 POLAR_RAYS = 16
 POLAR_RADII = np.array((0.3, 0.6, 0.85, 1.05, 1.25, 1.5))
 CENTROID_LEVEL = 0.4  # of the way from the surroundings to the highest response
@@ -146,7 +147,14 @@ class RimFitter:
             moved = self._centred(image, centres_px)
             if moved is None:
                 return None
+            far_px = max(
+                abs(b - a)
+                for one, other in zip(centres_px, moved, strict=True)
+                for a, b in zip(one, other, strict=True)
+            )
             centres_px = moved
+            if far_px < CENTRED_PX:
+                break
         keep = found = None
         for _ in range(STEPS_MAX):
             found = self._step(image, centres_px, keep)
@@ -279,8 +287,7 @@ class RimFitter:
         ratio = ground.sum(axis=-1) / np.maximum(own.sum(axis=-1), 1.0)
         covariances = _covariances(fit)
         front, rear = (
-            self._disc(fit, i, covariances[i], _median(ratio[i][fit.keep[i]]))
-            for i in (0, 1)
+            self._disc(fit, i, covariances[i], _median(ratio[i][fit.keep[i]])) for i in (0, 1)
         )
         return front, rear
 

@@ -214,7 +214,7 @@ class MarkSearch:
             order = np.argsort(-strength[own_mark], kind="stable")[:PLACES_MAX]
             keep.append(own_mark[order])
         index = np.concatenate(keep)
-        return at[index], mark[index], cosine[index]
+        return at[index], mark[index], np.asarray(cosine[index], np.float32)
 
     def _examined(
         self, part: Image, at: NDArray[np.int64], cosine: Floats, mark: int, shrink: int,
@@ -276,7 +276,7 @@ class _Sampler:
         cell = np.rint((at - self._origin) / self._shrink).astype(np.intp)
         height, width = self._part.shape[:2]
         u, v = np.clip(cell[..., 0], 0, width - 1), np.clip(cell[..., 1], 0, height - 1)
-        return self._part[v, u].astype(np.float32)
+        return np.asarray(self._part[v, u], np.float32)
 
     def response(self, px: Array, affine: Array, points: Array) -> Floats:
         """Return the mark's response, (N, P), at points in radii about places."""

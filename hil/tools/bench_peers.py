@@ -7,11 +7,14 @@ that the detectors alone are compared. A plain threshold stands for the simplest
 
 from __future__ import annotations
 
+import base64
+import html
 import math
 import statistics
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import cv2
@@ -115,18 +118,35 @@ def aruco(camera: CameraModel, height_m: float) -> Find:
     return find
 
 
-def apriltag(camera: CameraModel, height_m: float) -> Find | None:
-    """Return the AprilTag library's detector at full resolution; None where it is not installed."""
+@cache
+def _apriltag_detector() -> Any:
+    """Return the one detector of the process, None where the library is not installed."""
     try:
         from pupil_apriltags import Detector  # noqa: PLC0415 - an extra of the tests
     except ImportError:
         return None
-    detector = Detector(families="tag36h11", nthreads=1, quad_decimate=1.0)
+
+    class Kept(Detector):  # type: ignore[misc]
+        """A detector that is never taken down: version 1.0.4 crashes the process when it is."""
+
+        def __del__(self) -> None:
+            """Leave it to the end of the process."""
+
+    return Kept(families="tag36h11", nthreads=1, quad_decimate=1.0)
+
+
+def apriltag(camera: CameraModel, height_m: float) -> Find | None:
+    """Return the AprilTag library's detector at full resolution; None where it is not installed."""
+    detector = _apriltag_detector()
+    if detector is None:
+        return None
 
     def find(image: Image, _: scenes.Frame) -> PoseMeasurement:
         for tag in detector.detect(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)):
             if tag.tag_id == TAG.tag_id:
-                return _square_pose(camera, height_m, np.roll(tag.corners[::-1], 2, axis=0))
+                # Its pixels have their centres at halves, and its corners start at the bottom left.
+                corners_px = np.roll(tag.corners[::-1], 2, axis=0) - 0.5
+                return _square_pose(camera, height_m, corners_px)
         return _not_seen("no tag")
 
     return find
@@ -233,7 +253,9 @@ def _line(view: str, condition: str, method: str, frames: int, tally: _Tally) ->
     off = np.array(tally.errors).reshape(-1, 3)
     guess = np.array(tally.guesses).reshape(-1, 3)
     tracking = method.endswith("tracking") and len(off) > 1
-    slope = float(np.sum(off[:, :2] * guess[:, :2]) / np.sum(guess[:, :2] ** 2)) if tracking else math.nan
+    slope = math.nan
+    if tracking:
+        slope = float(np.sum(off[:, :2] * guess[:, :2]) / np.sum(guess[:, :2] ** 2))
     rms = np.sqrt(np.mean(off**2, axis=0)) if len(off) else np.full(3, math.nan)
     return Line(
         view, condition, method, frames,
@@ -280,3 +302,57 @@ def as_markdown(found: list[Line]) -> str:
             f" | {nees} | {line.median_ms:.1f} |"
         )
     return "\n".join(rows)
+
+
+CROP_PX, ZOOM = 96, 4
+
+
+def _picture(worst: Worst) -> str:
+    """Return the robot in a worst frame as a PNG in base64, the true marks drawn as crosses."""
+    frame, camera = worst.frame, worst.camera
+    if frame is None or camera is None:
+        return ""
+    model, marks, pose = camera_model(camera), camera.marks, frame.truth
+    c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
+    centres = [
+        model.project_point(
+            pose.x_m + c * mark.x_m - s * mark.y_m,
+            pose.y_m + s * mark.x_m + c * mark.y_m,
+            marks.height_m,
+        )
+        for mark in (marks.front, marks.rear)
+    ]
+    middle = np.mean(centres, axis=0)
+    height, width = frame.image.shape[:2]
+    left = int(np.clip(middle[0] - CROP_PX, 0, width - 2 * CROP_PX))
+    top = int(np.clip(middle[1] - CROP_PX // 2, 0, height - CROP_PX))
+    part = frame.image[top : top + CROP_PX, left : left + 2 * CROP_PX]
+    large = cv2.resize(part, None, fx=ZOOM, fy=ZOOM, interpolation=cv2.INTER_NEAREST)
+    for u, v in centres:
+        at = (round((u - left + 0.5) * ZOOM), round((v - top + 0.5) * ZOOM))
+        cv2.drawMarker(large, at, (255, 255, 255), cv2.MARKER_CROSS, 12, 1)
+    _, packed = cv2.imencode(".png", large)
+    return base64.b64encode(packed.tobytes()).decode()
+
+
+def as_page(found: list[Line], worst: list[Worst]) -> str:
+    """Return one HTML page: the table, and the worst frame of each condition; needs no network."""
+    rows = [line.strip("|").split("|") for line in as_markdown(found).splitlines()]
+    head = "".join(f"<th>{html.escape(cell.strip())}</th>" for cell in rows[0])
+    body = "".join(
+        "<tr>" + "".join(f"<td>{html.escape(cell.strip())}</td>" for cell in row) + "</tr>"
+        for row in rows[2:]
+    )
+    pictures = "".join(
+        f"<figure><img alt='' src='data:image/png;base64,{_picture(one)}'><figcaption>"
+        f"{html.escape(f'{one.view}, {one.condition}: {one.text}')}</figcaption></figure>"
+        for one in worst
+    )
+    return (
+        "<!doctype html><html lang='en'><head><meta charset='utf-8'><title>Vision bench</title>"
+        "<style>body{font:14px sans-serif;margin:2em}td,th{padding:2px 8px;text-align:left}"
+        "figure{display:inline-block;margin:6px}</style></head><body><h1>Vision bench</h1>"
+        f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+        "<h2>Worst frame of each condition (marks, tracking; crosses: the truth)</h2>"
+        f"{pictures}</body></html>"
+    )

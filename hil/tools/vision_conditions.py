@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -66,7 +66,7 @@ class Condition:
     gamma: float = 1.0
     light: float = 1.0
     white_balance: Colour = (1.0, 1.0, 1.0)
-    scene: SceneConfig = SceneConfig()
+    scene: SceneConfig = field(default_factory=SceneConfig)
     cover_m: float = 0.0
     edge: bool = False
 
@@ -177,7 +177,7 @@ def develop(sharp: NDArray[np.float32], condition: Condition, rng: np.random.Gen
     picture = picture + rng.standard_normal(picture.shape, np.float32) * np.sqrt(variance)
     if condition.gamma != 1.0:
         picture = 255.0 * np.power(np.clip(picture / 255.0, 0.0, 1.0), condition.gamma)
-    image = np.clip(np.rint(picture), 0, 255).astype(np.uint8)
+    image: Image = np.clip(np.rint(picture), 0, 255).astype(np.uint8)
     if condition.jpeg:
         _, packed = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, condition.jpeg])
         image = np.asarray(cv2.imdecode(packed, cv2.IMREAD_COLOR), np.uint8)
