@@ -40,6 +40,7 @@ GROSS_M, GROSS_RAD = 0.02, math.radians(5.0)
 SIZE_PX = (1280, 720)
 THRESHOLD_COS, THRESHOLD_DN = 0.9, 20.0
 SEARCH_M = 0.06
+HALF_DISTANCE_M = 0.1  # between the marks' centres: room for the tag and for blur beside it
 # Corners of a tag in its own frame, x forward and y left: as OpenCV gives them, clockwise from the
 # top left, where the top of the tag's picture is the robot's left.
 CORNERS = np.array([(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)])
@@ -231,7 +232,7 @@ def compare(view: str, condition: str, frames: int) -> tuple[list[Line], Worst]:
     """Return the lines of one condition and the worst frame of the marks, when tracking."""
     name, coloured = condition.removesuffix(", coloured floor"), condition.endswith("floor")
     setting = scenes.CONDITIONS[name]
-    marks = scenes.marks_of(scenes.RED, scenes.BLUE) if coloured else MarksConfig()
+    marks = scenes.marks_of(scenes.RED, scenes.BLUE if coloured else scenes.GREEN, HALF_DISTANCE_M)
     clutter = scenes.coloured_floor(marks) if coloured else ()
     camera = scenes.camera_of(view, SIZE_PX, setting, marks, clutter, tag=TAG)
     compared = methods(camera)

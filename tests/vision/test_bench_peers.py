@@ -1,8 +1,7 @@
 """The comparison of the vision bench: every detector on the same frames, and the page of the worst."""
 
-import pytest
-
 from hil.tools import bench_peers
+from hil.tools import vision_conditions as scenes
 
 
 def test_all_detectors_find_a_clean_robot_and_the_marks_are_best():
@@ -21,18 +20,13 @@ def test_all_detectors_find_a_clean_robot_and_the_marks_are_best():
     assert "ceiling, clean" in page
 
 
-def test_a_detector_that_sees_nothing_is_counted_so(monkeypatch):
-    """Negative control: with another tag's number ArUco and AprilTag find none, the marks all."""
-    sought = bench_peers.TAG.model_copy(update={"tag_id": 9})
-    drawn, compare = bench_peers.TAG, bench_peers.methods
-
-    def methods(camera):
-        monkeypatch.setattr(bench_peers, "TAG", sought)
-        return compare(camera)
-
-    monkeypatch.setattr(bench_peers, "methods", methods)
-    lines, _ = bench_peers.compare("ceiling", "clean", 1)
-    assert drawn.tag_id != sought.tag_id
-    found = {line.method: line.found_ratio for line in lines}
-    assert found["marks, tracking"] == 1.0
-    assert found["cv2.aruco"] == pytest.approx(0.0)
+def test_another_tag_is_not_the_robot():
+    """Negative control: where tag 9 is drawn, ArUco and AprilTag find no tag 7; the marks are seen."""
+    other = bench_peers.TAG.model_copy(update={"tag_id": 9})
+    setting = scenes.CONDITIONS["clean"]
+    camera = scenes.camera_of("ceiling", bench_peers.SIZE_PX, setting, tag=other)
+    frame = next(scenes.frames("ceiling", bench_peers.SIZE_PX, setting, 1, tag=other))
+    seen = {name: find(frame.image, frame) for name, find in bench_peers.methods(camera).items()}
+    assert seen["cv2.aruco"].pose is None
+    assert seen.get("AprilTag", seen["cv2.aruco"]).pose is None
+    assert seen["marks, tracking"].pose is not None
