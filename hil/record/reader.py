@@ -15,6 +15,7 @@ from hil.record import layout
 from hil.record.journal import Columns, read_journal, read_parquet
 from hil.record.manifest import Manifest, file_entry, read_manifest
 from hil.record.schema import FRAME_NAMES, SAMPLE_NAMES
+from hil.record.tick_rows import COVARIANCE
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +108,9 @@ def read_run(path: Path) -> RunRecord:
     missing = [name for name in SAMPLE_NAMES if name not in samples]
     if missing:
         raise BadInput(f"{path / layout.SAMPLES}: damaged: column {missing[0]} is missing")
-    frames = read_table(path, layout.FRAMES, layout.FRAMES_JOURNAL, required=False)
+    frames = completed_frames(
+        read_table(path, layout.FRAMES, layout.FRAMES_JOURNAL, required=False)
+    )
     return RunRecord(
         path=path,
         manifest=manifest,
@@ -117,6 +120,13 @@ def read_run(path: Path) -> RunRecord:
         pictures=read_pictures(path / layout.PICTURES),
         problems=tuple(problems),
     )
+
+
+def completed_frames(frames: Columns) -> Columns:
+    """Return the frames with the covariance that records made before it was kept do not have."""
+    rows = len(frames["t_cam_s"]) if "t_cam_s" in frames else 0
+    missing = [name for name in COVARIANCE if name not in frames] if rows else []
+    return {**frames, **{name: np.full(rows, np.nan) for name in missing}}
 
 
 def altered_files(path: Path, manifest: Manifest) -> list[str]:
