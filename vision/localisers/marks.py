@@ -127,7 +127,9 @@ class MarkLocaliser:
             why = why or refusal
             if found is None:
                 continue
-            if best is not None and not _same(found, best):
+            if best is not None and _sharing(found, best):
+                best = min(best, found, key=self._badness)
+            elif best is not None:
                 return None, "two places look like the robot"
             best = best or found
         return best, why or reason
@@ -207,6 +209,11 @@ class MarkLocaliser:
             },
         )
 
+    def _badness(self, found: _Found) -> float:
+        """Return how far a find is from the marks as they are: distance, sizes and rims."""
+        rims = sum(abs(d.growth) + d.residual_px / d.radius_px for d in found.discs)
+        return rims + abs(found.gap_m) / (DISTANCE_TOLERANCE * self._distance_m)
+
     def _spread(self, disc: Disc) -> Array:
         """Return the covariance of a mark's place on its plane, (2, 2), m^2."""
         uu, uv, vv = disc.covariance_px2
@@ -215,16 +222,16 @@ class MarkLocaliser:
         return spread
 
 
+def _sharing(one: _Found, other: _Found) -> bool:
+    """Return whether two finds have a mark in common: at most one of them is a robot."""
+    pairs = zip(one.centres_m, other.centres_m, strict=True)
+    return any(math.dist(a, b) < SAME_PLACE_M for a, b in pairs)
+
+
 def _near(centres_m: Centres, found: _Found, within_m: float) -> bool:
     """Return whether a hypothesis is the one already measured."""
     pairs = zip(centres_m, found.centres_m, strict=True)
     return all(math.dist(a, b) < within_m for a, b in pairs)
-
-
-def _same(one: _Found, other: _Found) -> bool:
-    """Return whether two finds are one robot."""
-    pairs = zip(one.centres_m, other.centres_m, strict=True)
-    return all(math.dist(a, b) < SAME_PLACE_M for a, b in pairs)
 
 
 def _area_px(disc: Disc) -> float:
