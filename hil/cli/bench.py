@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
 from hil.cli.options import json_option, print_json
@@ -16,17 +18,28 @@ from hil.cli.options import json_option, print_json
               "wheels: robots drawn from 10 % around the believed one.")  # fmt: skip
 @click.option("--tune", "candidates", type=click.IntRange(11, 100_000), metavar="CANDIDATES",
               help="wheels: search the gains of both laws, that many candidates each.")  # fmt: skip
+@click.option("--page", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+              help="vision: write an HTML page with the worst frames there.")  # fmt: skip
+@click.option("--frames", type=click.IntRange(2, 10_000), default=40, show_default=True,
+              help="vision: frames of each condition that marks, tags and peers are shown.")  # fmt: skip
 @json_option
-def command(what: str, runs: int, candidates: int | None, as_json: bool) -> None:
+def command(
+    what: str, runs: int, candidates: int | None, page: Path | None, frames: int, as_json: bool
+) -> None:
     """Measure the speed of the harness, or compare the wheel laws of the board.
 
     \b
     speed     medians of several runs, with least and largest
     parts     what a tick's shares, a report and the viewer's file cost
     wheels    both wheel laws at step, ramp, crawl, turn, load, friction, battery sag
-    vision    the colour marks on rendered sequences of known truth; some minutes
+    vision    the colour marks on rendered sequences with known truth, and beside cv2.aruco,
+              AprilTag and a plain threshold; half an hour
     firmware  what the sketch costs the Mega 2560: cycles by part, load, memory
     """  # noqa: D301 - \b is click's mark for a verbatim paragraph
+    if what != "vision" and page is not None:
+        raise click.UsageError(f"--page: {what} has no frames to show; only vision has")
+    if page is not None and not page.absolute().parent.is_dir():
+        raise click.UsageError(f"--page {page}: there is no folder {page.absolute().parent}")
     if what in {"speed", "parts"} and candidates is not None:
         raise click.UsageError("--tune: the wheels have gains, the speed figures have none")
     if candidates is not None:
@@ -34,25 +47,35 @@ def command(what: str, runs: int, candidates: int | None, as_json: bool) -> None
     elif what == "wheels":
         _compare_wheels(runs, as_json)
     elif what == "vision":
-        _measure_vision(as_json)
+        _measure_vision(frames, page, as_json)
     elif what == "firmware":
         _measure_firmware(as_json)
     else:
         _measure_speed(what, runs, as_json)
 
 
-def _measure_vision(as_json: bool) -> None:
-    from hil.tools import bench_vision
+def _measure_vision(frames: int, page: Path | None, as_json: bool) -> None:
+    from dataclasses import asdict
+
+    from hil.tools import bench_peers, bench_vision
 
     def progress(text: str) -> None:
         click.echo(text, err=True)
 
     rows = bench_vision.table(100, progress)
     empty = bench_vision.empty_scenes(10_000, progress)
+    shown = list(bench_peers.lines(frames, progress))
+    peers = [line for lines, _ in shown for line in lines]
+    if page is not None:
+        part = page.with_name(page.name + ".part")
+        part.write_text(bench_peers.as_page(peers, [worst for _, worst in shown]))
+        part.replace(page)
     if as_json:
-        print_json(bench_vision.as_document(rows, empty))
+        document = bench_vision.as_document(rows, empty)
+        print_json({**document, "peers": [asdict(line) for line in peers]})
         return
     click.echo(bench_vision.as_markdown(rows, empty))
+    click.echo("\n" + bench_peers.as_markdown(peers))
 
 
 def _measure_firmware(as_json: bool) -> None:

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from hil.wire.link import BoardLink, WheelReport
 
 _NAN = math.nan
+COVARIANCE = (
+    "cov_xx_m2", "cov_xy_m2", "cov_xt_m_rad", "cov_yy_m2", "cov_yt_m_rad", "cov_tt_rad2",
+)  # fmt: skip
 MARKS = ("front_u_px", "front_v_px", "rear_u_px", "rear_v_px")
 _NO_ESTIMATE = (_NAN,) * 5
 _NO_REPORT = (_NAN,) * 6
@@ -98,5 +101,6 @@ def frame_row(
         measurement.quality,
         measurement.sigma_xy_m,
         measurement.sigma_theta_rad,
+        *(measurement.covariance or (_NAN,) * len(COVARIANCE)),
         *(get(name, _NAN) for name in MARKS),
     )
