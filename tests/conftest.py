@@ -7,8 +7,12 @@ import signal
 
 import pytest
 
+from hil.core.registries import BY_KIND
+
 # Commands that tests run do not write into the summary of the CI job that runs the tests.
 os.environ.pop("GITHUB_STEP_SUMMARY", None)
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def pytest_configure() -> None:
@@ -25,3 +29,15 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
             f"{len(skipped)} tests were skipped: HIL_NO_SKIPS asks for all", red=True
         )
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _as_before_the_module():
+    """Forget after each module what its tests and fixtures made known by name, and signal handlers."""
+    kept = {kind: dict(registry._entries) for kind, registry in BY_KIND.items() if registry.names()}
+    handlers = {number: signal.getsignal(number) for number in _SIGNALS}
+    yield
+    for kind, entries in kept.items():
+        BY_KIND[kind]._entries = entries
+    for number, handler in handlers.items():
+        signal.signal(number, handler)

@@ -41,7 +41,7 @@ def let_readers_go() -> None:
 
 
 def _outlet(stream: TextIO | None, descriptor: int) -> TextIO:
-    if not isinstance(stream, io.TextIOWrapper):
+    if not isinstance(stream, io.TextIOWrapper) or not _writes_to(stream, descriptor):
         return open(os.devnull, "w", encoding="utf-8") if stream is None else stream
     stream.flush()
     return io.TextIOWrapper(
@@ -51,3 +51,11 @@ def _outlet(stream: TextIO | None, descriptor: int) -> TextIO:
         line_buffering=stream.line_buffering,
         write_through=stream.write_through,
     )
+
+
+def _writes_to(stream: TextIO, descriptor: int) -> bool:
+    """Return whether a stream ends there: one that a caller put in its place stays his."""
+    try:
+        return stream.fileno() == descriptor
+    except OSError:  # kept in memory
+        return False

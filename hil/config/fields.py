@@ -104,7 +104,7 @@ def _setting(model: type[BaseModel], name: str, key: str, field: FieldInfo, kind
     return Setting(
         key=key,
         unit=_RATIO if key == "mismatch" else unit,
-        meaning=field.description or "",
+        meaning=field.description or ("of this table" if name == "kind" else ""),
         source=str(extra_of(field).get("source", "")),
         default=None if default is PydanticUndefined else default,
         low=limits.get("ge", limits.get("gt")),

@@ -100,6 +100,19 @@ def make_gains(tables: Mapping[str, Any]) -> Gains:
     return gains_model().model_validate(tables)
 
 
+def only_gains_of(tree: dict[str, Any], laws: Sequence[str]) -> dict[str, Any]:
+    """Return a scenario's tree without the gain tables of outer laws that do not run in it.
+
+    What is left tells one task from another: other laws are known or not from process to process.
+    """
+    kept = {"origin", *(OUTER_LAWS.get(name).key for name in laws)}
+    sets = {
+        name: {key: value for key, value in tables.items() if key in kept}
+        for name, tables in tree["control"]["gains"].items()
+    }
+    return tree | {"control": tree["control"] | {"gains": sets}}
+
+
 class GainSets(Section):
     """The named sets; `hil/data/gains` holds what ships."""
 

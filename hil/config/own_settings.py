@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from pydantic import BaseModel, ValidationInfo
+from pydantic import BaseModel, ConfigDict, ValidationInfo
 
 from hil.core.errors import BadInput
 from hil.core.registries import ESTIMATORS, LOCALISERS, REFERENCES
@@ -41,6 +41,8 @@ BY_NAME_KEY = {place.name_key: place for place in PLACES}
 
 class NoSettings(BaseModel):
     """The settings of what has none."""
+
+    model_config = ConfigDict(frozen=True)
 
 
 def validated(place: Place, table: Any, info: ValidationInfo) -> BaseModel:

@@ -11,6 +11,7 @@ from typing import Any
 
 from hil.core.errors import BadInput
 
+PART = ".part"  # ends the name of a file in work
 TEXT_BYTES = 4_000_000  # scenarios, robots, laws, mappings: the largest shipped one has 12 KB
 RECORD_BYTES = 64_000_000  # manifests, tables as text
 LOG_BYTES = 512_000_000  # logs: a day at the link's full rate
@@ -35,7 +36,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
     After an error the half-written file is gone and `path` is as it was. Raises OSError.
     """
-    part = path.with_name(f"{path.name}.part")
+    part = path.with_name(f"{path.name}{PART}")
     try:
         yield part
         part.replace(path)

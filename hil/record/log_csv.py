@@ -11,7 +11,7 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hil.core.errors import BadInput
-from hil.record.log_mapping import LogMapping
+from hil.record.log_mapping import LogMapping, Source
 from hil.record.log_signals import (
     POSE,
     Signals,
@@ -68,10 +68,18 @@ class Table:
         )
 
 
-def read_csv(path: Path, settings: LogMapping) -> Signals:
-    """Return a row per pose of a CSV file; raises BadInput."""
-    wanted = {name: source for name, source in settings.columns.items() if source.column}
-    used = [settings.t.column, *settings.only, *(source.column for source in wanted.values())]
+def wanted_columns(settings: LogMapping) -> dict[str, Source]:
+    """Return what is taken from columns of the file, by the name it gets."""
+    return {name: source for name, source in settings.columns.items() if source.column}
+
+
+def timed_cells(path: Path, settings: LogMapping) -> tuple[_Cells, Array, Callable[[int], str]]:
+    """Return cells, times in s, and what says why a row's time is refused; raises BadInput."""
+    used = [
+        settings.t.column,
+        *settings.only,
+        *(source.column for source in wanted_columns(settings).values()),
+    ]
     table = _chosen(_read_table(path, used), settings)
     cells = _Cells(table, settings.decimal)
     raw_t = cells.column(settings.t.column, "t")
@@ -82,6 +90,13 @@ def read_csv(path: Path, settings: LogMapping) -> Signals:
         hint = "" if settings.t.wraps_at else counter_hint(raw_t[before], raw_t[row])
         return f"{table.place(row)}: {fall_text(t_s[before], t_s[row])}{hint}"
 
+    return cells, t_s, refusal
+
+
+def read_csv(path: Path, settings: LogMapping) -> Signals:
+    """Return a row per pose of a CSV file; raises BadInput."""
+    wanted = wanted_columns(settings)
+    cells, t_s, refusal = timed_cells(path, settings)
     order, notes = in_order(t_s, settings.disorder, refusal, "rows")
     untimed = int(np.count_nonzero(~np.isfinite(t_s)))
     if untimed:

@@ -7,7 +7,6 @@ columns of `samples.parquet` a mapping may name those of EXTRA.
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,9 +15,10 @@ import numpy as np
 
 from hil.config.load import build
 from hil.core.errors import BadInput
-from hil.record.log_csv import _Cells, _chosen, _read_table
+from hil.core.files import read_toml
+from hil.record.log_csv import _read_table, timed_cells, wanted_columns
 from hil.record.log_mapping import STANDARD, LogMapping, Source
-from hil.record.log_signals import counter_hint, fall_text, in_order, scaled
+from hil.record.log_signals import in_order, scaled
 from hil.record.log_telemetry import _chosen as _senders
 from hil.record.log_telemetry import _Log, _ordered, _robot
 from hil.record.reader import read_run
@@ -96,13 +96,7 @@ def read_series(log: Path, mapping: Path | None) -> LogSeries:
 def _mapping(path: Path | None) -> LogMapping:
     if path is None:
         return LogMapping()
-    try:
-        tree = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(f"mapping {path}: cannot be read: {error}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise BadInput(f"{path}: not valid TOML: {error}") from None
-    settings = build(LogMapping, tree, str(path))
+    settings = build(LogMapping, read_toml(path, "mapping"), str(path))
     for name, source in settings.columns.items():
         if (name not in SAMPLE_NAMES and name not in EXTRA) or name == "t_s":
             raise BadInput(
@@ -120,18 +114,8 @@ def _of_csv(path: Path, settings: LogMapping, mapped: bool) -> tuple[Series, lis
     notes: list[str] = []
     if not mapped:
         settings, notes = _guessed(path, settings)
-    wanted = {name: source for name, source in settings.columns.items() if source.column}
-    used = [settings.t.column, *settings.only, *(source.column for source in wanted.values())]
-    table = _chosen(_read_table(path, used), settings)
-    cells = _Cells(table, settings.decimal)
-    raw_t = cells.column(settings.t.column, "t")
-    t_s = scaled(raw_t, settings.t)
-
-    def refusal(row: int) -> str:
-        before = int(np.flatnonzero(np.isfinite(t_s[:row]))[-1])
-        hint = "" if settings.t.wraps_at else counter_hint(raw_t[before], raw_t[row])
-        return f"{table.place(row)}: {fall_text(t_s[before], t_s[row])}{hint}"
-
+    wanted = wanted_columns(settings)
+    cells, t_s, refusal = timed_cells(path, settings)
     order, said = in_order(t_s, settings.disorder, refusal, "rows")
     series = {
         name: _known(t_s[order], scaled(cells.column(source.column, name)[order], source))

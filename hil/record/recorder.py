@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from hil.analysis import metrics
 from hil.core.errors import BadInput, RecordFault
-from hil.core.files import replace_file
+from hil.core.files import PART, replace_file
 from hil.record import layout
 from hil.record.camera import CameraKeeper
 from hil.record.journal import Columns, Journal, read_journal, write_parquet
@@ -202,7 +202,7 @@ class Recorder:
         with suppress(OSError, RecordFault):
             self._stop_writers()
         with suppress(OSError):
-            for part in self.path.rglob("*.part"):
+            for part in self.path.rglob(f"*{PART}"):
                 part.unlink()
         self._keeping.release()
         ended = {"outcome": "fault", "outcome_detail": detail, "tick_count": self._rows}

@@ -12,6 +12,7 @@ in the background) stay ignored.
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import threading
@@ -41,8 +42,18 @@ def take_signals() -> None:
 
 
 def ignore_signals() -> None:
-    """Ignore the signals to the end: the work is done, and its status known."""
-    _handle(signal.SIG_IGN)
+    """Ignore the signals to the end: the work is done, and its status known.
+
+    Until the interpreter ends, by a handler that does nothing: what runs in this process after the
+    command, and every process begun there, would else take the signals as ignored from outside.
+    """
+    _handle(_pass)
+    atexit.unregister(_handle)
+    atexit.register(_handle, signal.SIG_IGN)  # Python takes its handlers away at the end
+
+
+def _pass(_number: int, _frame: FrameType | None) -> None:
+    """Do nothing."""
 
 
 def _handle(handler: Any) -> None:

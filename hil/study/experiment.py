@@ -12,9 +12,10 @@ from random import Random
 from typing import TYPE_CHECKING, Any
 
 from hil.config.fit import check_fit
+from hil.config.gains import only_gains_of
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput
-from hil.core.files import replace_file
+from hil.core.files import PART, replace_file
 from hil.core.registries import source_digests
 from hil.record.manifest import Manifest
 from hil.report.circle import CircleStudy
@@ -153,7 +154,7 @@ def claim(
 
 
 def _identity(spec: RunSpec) -> dict[str, Any]:
-    tree = json.dumps(spec.scenario.model_dump(mode="json"), sort_keys=True)
+    tree = json.dumps(_task(spec.scenario.model_dump(mode="json"), spec), sort_keys=True)
     return {
         "scenario": spec.scenario.name,
         "scenario_sha256": hashlib.sha256(tree.encode()).hexdigest(),
@@ -164,6 +165,10 @@ def _identity(spec: RunSpec) -> dict[str, Any]:
         "seed": spec.seed,
         "folder": spec.out.name,
     } | ({"texts": texts} if (texts := source_digests([spec.outer])) else {})
+
+
+def _task(tree: dict[str, Any], spec: RunSpec) -> dict[str, Any]:
+    return only_gains_of(tree, [spec.outer])
 
 
 def _refuse_other_plan(
@@ -187,7 +192,7 @@ def _refuse_other_plan(
 def _refuse_other_records(folder: Path, specs: Sequence[RunSpec]) -> None:
     """Raise BadInput unless the folder holds records of these specs and nothing else."""
     runs = {spec.out.name: spec for spec in specs}
-    ours = {PLAN, f"{PLAN}.part", SET_ASIDE, REPORT, LOCK, *runs}
+    ours = {PLAN, f"{PLAN}{PART}", SET_ASIDE, REPORT, LOCK, *runs}
     found = {item.name for item in folder.iterdir()} if folder.is_dir() else {""}
     records = [name for name in runs if name in found]
     if not found <= ours or not (records or PLAN in found):
@@ -206,7 +211,8 @@ def _refuse_other_records(folder: Path, specs: Sequence[RunSpec]) -> None:
 def _is_of(manifest: Manifest, spec: RunSpec) -> bool:
     names = ("target", "camera", "outer", "inner", "seed")
     same = all(getattr(manifest, name) == getattr(spec, name) for name in names)
-    return same and manifest.scenario == json.loads(spec.scenario.model_dump_json())
+    ours = json.loads(spec.scenario.model_dump_json())
+    return same and _task(manifest.scenario, spec) == _task(ours, spec)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -19,11 +18,12 @@ from typing import IO, Any, Self
 
 from hil.config.control import ControlConfig, PointReference
 from hil.config.deck import load_deck
-from hil.config.gains import Gains
+from hil.config.gains import Gains, only_gains_of
 from hil.config.load import build, builtin_names, load_robot, load_scenario
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
-from hil.core.registries import source_digests
+from hil.core.files import read_toml
+from hil.core.registries import OUTER_LAWS, source_digests
 from hil.study.tune import (
     CASES,
     COST_WEIGHTS,
@@ -67,7 +67,8 @@ class Tasks:
         if not self.own:
             return {}
         first = next(iter(self.scenarios.values()))
-        return {"robot": first.robot.name, "tasks_sha256": _digest(self.trees)}
+        trees = [only_gains_of(tree, ()) for tree in self.trees.values()]
+        return {"robot": first.robot.name, "tasks_sha256": _digest(trees)}
 
     @property
     def trees(self) -> dict[str, Any]:
@@ -121,8 +122,8 @@ def load_tasks(names: Sequence[str], robot: str | None, overrides: Sequence[str]
 def _is_deck(name: str) -> bool:
     if name in builtin_names("decks"):
         return True
-    with suppress(OSError, ValueError):
-        return "scenarios" in tomllib.loads(Path(name).read_text(encoding="utf-8"))
+    with suppress(BadInput):
+        return "scenarios" in read_toml(Path(name))
     return False
 
 
@@ -230,16 +231,21 @@ def identity_of(
         "seed": plan.search_seed,
         "seeds": list(plan.seeds),
         "population": plan.population,
-        "tasks": _digest(tasks.trees),
-        "gains kept": _digest(tasks.base.model_dump(mode="json")),
+        "tasks": _digest([only_gains_of(tree, laws) for tree in tasks.trees.values()]),
+        "gains kept": _digest(_tables_of(tasks.base, laws)),
         "procedure": _digest(searched),
         "program": program,
     }
 
 
 def _key(trial: Trial) -> str:
-    gains = trial.gains.model_dump(exclude={"origin"})
+    gains = _tables_of(trial.gains, [trial.outer])
     return _digest([trial.outer, gains, asdict(trial.case), trial.seed])[:24]
+
+
+def _tables_of(gains: Gains, laws: Sequence[str]) -> dict[str, Any]:
+    """Return the gains of some laws: which others are known differs from process to process."""
+    return gains.model_dump(mode="json", include={OUTER_LAWS.get(name).key for name in laws})
 
 
 def _digest(tree: object) -> str:

@@ -17,6 +17,7 @@ from types import FrameType
 from typing import IO, Any
 
 from hil.core.errors import BadInput, Stopped
+from hil.core.files import PART
 
 LOCK, SET_ASIDE = ".lock", "set-aside"
 _INTERRUPTED_AGAIN = 3
@@ -28,7 +29,7 @@ def is_new(folder: Path, plan: str) -> bool:
         return True
     if not folder.is_dir():
         return False
-    return {item.name for item in folder.iterdir()} <= {f"{plan}.part", LOCK}
+    return {item.name for item in folder.iterdir()} <= {f"{plan}{PART}", LOCK}
 
 
 def set_aside(path: Path, folder: Path) -> Path:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -12,6 +11,7 @@ from hil.config.fields import Setting, settings
 from hil.config.load import builtin_names
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME
+from hil.core.files import parse_toml
 from hil.core.registries import BY_PLURAL, ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES
 from hil.core.registry import BUILT_IN, Entry, Registry
 from hil.runs.execute import INNER_LAWS
@@ -138,7 +138,7 @@ def _item(entry: Entry, registry: Registry) -> Item:
 def _first_words(kind: str, name: str) -> str:
     """Return what a file says of itself: its description, or the first line of its comment."""
     text = (files("hil") / "data" / kind / f"{name}.toml").read_text(encoding="utf-8")
-    said = tomllib.loads(text).get("description")
+    said = parse_toml(text, f"{name}.toml").get("description")
     if said:
         return str(said)
     first = text.splitlines()[0]

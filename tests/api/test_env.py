@@ -121,7 +121,7 @@ def test_a_fault_terminates_and_costs_what_a_failed_run_costs() -> None:
         total += reward
     assert terminated
     assert not truncated
-    assert info["detail"].startswith("geofence: robot at")
+    assert info["detail"].startswith("geofence: robot ")
     assert total == pytest.approx(-COST_FAILED)
     assert made.record().events[-2].kind == "stopped"
     with pytest.raises(hil.BadInput, match="call reset first"):

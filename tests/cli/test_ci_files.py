@@ -66,7 +66,7 @@ def test_a_run_that_ends_early_is_all_errors(tmp_path: Path) -> None:
     root = ET.parse(junit).getroot()
     assert counts(root) == (2, 0, 2)
     messages = [error.attrib["message"] for error in root.iter("error")]
-    assert all("fault: geofence: robot at (5.000" in message for message in messages)
+    assert all("fault: geofence: robot seen at (5.000" in message for message in messages)
 
 
 def test_a_scenario_without_requirements_is_one_case(tmp_path: Path) -> None:
@@ -133,7 +133,7 @@ def test_experiment_has_a_suite_for_each_run_and_names_its_report(
 ) -> None:
     """One scenario, both laws: two suites, each failure with the report's path, one summary."""
     monkeypatch.setattr("hil.study.experiment.circle_study", lambda: None)
-    monkeypatch.setattr("hil.study.experiment.run_all", lambda specs, _: [*map(execute, specs)])
+    monkeypatch.setattr("hil.study.side_by_side.run_all", lambda specs, _: [*map(execute, specs)])
     summary = tmp_path / "summary.md"
     summary.write_text("before\n", encoding="utf-8")
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(summary))

@@ -103,7 +103,8 @@ def test_bounds_in_schema_are_those_of_the_listing() -> None:
         table, _, name = setting.key.rpartition(".")
         if table == "robot" and setting.low is not None:
             field = copy.deepcopy(properties[name])
-            low = field["exclusiveMinimum" if setting.above else "minimum"]
+            number = field.get("anyOf", [field])[0]  # of one that may be left out: number or null
+            low = number["exclusiveMinimum" if setting.above else "minimum"]
             assert low == setting.low, setting.key
             assert setting.unit in field["description"]
             seen += 1

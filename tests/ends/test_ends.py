@@ -147,6 +147,12 @@ class Mine:
         self._seen = 0
     def __getattr__(self, name):
         return getattr(self._inner, name)
+    def on_wheels(self, sample):
+        self._inner.on_wheels(sample)
+    def on_command(self, t_s, eta1_m_s, theta_dot_rad_s):
+        self._inner.on_command(t_s, eta1_m_s, theta_dot_rad_s)
+    def estimate_at(self, t_s):
+        return self._inner.estimate_at(t_s)
     def on_pose(self, t_s, measurement):
         self._seen += 1
         if self._seen > 40:
@@ -163,7 +169,7 @@ def test_an_estimator_of_ones_own_that_raises_is_named_with_its_line(tmp_path: P
     file.write_text(_ESTIMATOR)
     made = execute(spec(tmp_path / "run", duration_s=5.0, estimator=str(file)))
     assert made.manifest.outcome == "fault"
-    assert "mine.py, line 14" in made.manifest.outcome_detail
+    assert "mine.py, line 20" in made.manifest.outcome_detail
     assert "by my own hand" in made.manifest.outcome_detail
     assert exit_status(made) == 3
     assert {"stopped", "stop"} & {event.kind for event in made.events}

@@ -181,7 +181,7 @@ def test_the_body_may_ask_for_more(results: Results) -> None:
 def test_a_fault_of_the_rig_fails_with_its_cause(results: Results) -> None:
     """A run that ends early passes nothing."""
     text = results.text("failure", "test_fault")
-    assert "run not complete: fault: geofence: robot at (5.000" in text
+    assert "run not complete: fault: geofence: robot seen at (5.000" in text
 
 
 @pytest.mark.parametrize(

@@ -16,15 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.config.camera import CameraConfig, MarkConfig, MarksConfig
-from hil.core.registries import LOCALISERS
+from hil.config.camera import MarkConfig, MarksConfig
 from hil.core.types import Pose, PoseMeasurement
 from vision.camera import CameraModel
-from vision.camera_setup import camera_model
 from vision.disc_fit import Disc, Marks, RimFitter
 from vision.mark_search import CHROMA_BASIS, Centres, MarkSearch, Window
 from vision.pose_fit import weighted_pose
-from vision.tracker import Localiser
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -245,13 +242,3 @@ def _response(mark: MarkConfig) -> Array:
     colour = np.asarray(mark.colour)
     weights: Array = colour - colour.mean()
     return weights / np.linalg.norm(weights)
-
-
-@LOCALISERS.register("marks", summary="colour marks on the robot's plate, as in the thesis")
-def make_marks(camera: CameraConfig) -> Localiser:
-    """Return the localiser of the colour marks that a camera's file describes."""
-    if camera.marks.more:
-        from vision.many_marks import ManyMarks  # noqa: PLC0415 - it is made of this module's
-
-        return ManyMarks(camera)
-    return MarkLocaliser(camera_model(camera), camera.marks)

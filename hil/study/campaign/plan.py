@@ -18,6 +18,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from hil.config.base import PlainName, Section
 from hil.config.control import OuterLawName
+from hil.config.gains import only_gains_of
 from hil.config.limits import check_board
 from hil.config.load import build, load_scenario, put_value, read_tree
 from hil.config.scenario import Scenario
@@ -215,7 +216,8 @@ class Campaign:
     @property
     def digest(self) -> str:
         """Return what two campaigns share exactly when their runs are the same."""
-        tree = {"file": self.file.model_dump(mode="json"), "base": self.base}
+        base = only_gains_of(self.base, self.file.outer)
+        tree = {"file": self.file.model_dump(mode="json"), "base": base}
         tree |= {"texts": texts} if (texts := source_digests(self.file.outer)) else {}
         return hashlib.sha256(json.dumps(tree, sort_keys=True).encode()).hexdigest()
 

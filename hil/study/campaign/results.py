@@ -23,7 +23,7 @@ import pyarrow.parquet as pq
 from hil import __version__
 from hil.core.errors import BadInput, RigFault
 from hil.core.figures import METRICS
-from hil.core.files import replace_file, replacing
+from hil.core.files import PART, replace_file, replacing
 from hil.record.manifest import git_revision
 from hil.study.campaign.plan import Campaign, Job
 from hil.study.work_folder import LOCK, SET_ASIDE, is_new, set_aside
@@ -98,7 +98,7 @@ class ResultStore:
                 )
         try:
             (self.folder / PARTS).mkdir(parents=True, exist_ok=True)
-            for leftover in self.folder.rglob("*.part"):  # cut off while it was written
+            for leftover in self.folder.rglob(f"*{PART}"):  # cut off while it was written
                 leftover.unlink()
             tree = {
                 "sha256": campaign.digest,
@@ -120,7 +120,7 @@ class ResultStore:
             return str(json.loads(path.read_bytes())["sha256"])
         except (OSError, ValueError, KeyError, TypeError):
             names = {item.name for item in self.folder.iterdir()} if self.folder.is_dir() else {""}
-            if not {name.removesuffix(".part") for name in names} <= _OURS:
+            if not {name.removesuffix(PART) for name in names} <= _OURS:
                 return None
         found = self._schema.metadata[_DIGEST].decode() if path.exists() else None
         for file in self._files():

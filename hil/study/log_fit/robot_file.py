@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.config.load import load_robot
 from hil.core.errors import BadInput
-from hil.core.files import replace_file
+from hil.core.files import parse_toml, read_text, replace_file
 from hil.study.log_fit.fit import USUAL, twin_values
 
 if TYPE_CHECKING:
@@ -43,11 +42,10 @@ def believed_robot(file: Path, start: str | None) -> tuple[str, RobotConfig]:
 def _below(file: Path) -> str:
     """Return the base of a file that an earlier fit wrote, or the file itself."""
     try:
-        text = file.read_text(encoding="utf-8")
-        tree = tomllib.loads(text)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        text = read_text(file)
+    except (OSError, UnicodeDecodeError) as error:
         raise BadInput(f"--robot {file}: cannot be read: {error}") from None
-    base = tree.get("base")
+    base = parse_toml(text, f"--robot {file}").get("base")
     if not text.startswith(_MARK) or not isinstance(base, str):
         return str(file)
     return str(file.parent / base) if base.endswith(".toml") else base
