@@ -16,7 +16,9 @@ namespace twin {
 // One list: C++ fields, their Python names, and what a caller must set (no defaults).
 #define TWIN_PLANT_PARAMETERS(X)                                                                                     \
   X(mass_kg)                                                                                                         \
-  X(inertia_kg_m2) X(wheel_radius_m) X(track_m) X(front_axle_m) X(rear_axle_m)                                       \
+  X(inertia_kg_m2)                                                                                                   \
+  X(wheel_radius_m)                                                                                                  \
+  X(track_m) X(front_axle_m) X(rear_axle_m)                                                                          \
       X(d0_m) X(wheel_inertia_kg_m2)                                                                                 \
           X(motor_per_side) X(motor_resistance_ohm) X(motor_inductance_h)                                            \
               X(motor_torque_constant_n_m_a) X(motor_emf_constant_v_s_rad) X(motor_gear_ratio)                       \

@@ -67,6 +67,24 @@ std::optional<Matrix> inverse(const Matrix& m) {
   return Matrix{{{a / det, b / det, c / det}, {b / det, d / det, e / det}, {c / det, e / det, f / det}}};
 }
 
+// Usable rays whose levels hold nothing of a cover's: levels are means over neighbouring rays, and two
+// rays side by side that show no edge are something in front; one alone is noise.
+Mask clear_of_cover(const Mask& usable) {
+  Mask clear;
+  for (int ray = 0; ray < kRays; ++ray) {
+    const auto shown = [&](int away) { return usable[(ray + away + kRays) % kRays]; };
+    int beside = 0;
+    for (int k = -2; k <= 2; ++k) {
+      beside += shown(k) ? 1 : 0;
+    }
+    clear[ray] = usable[ray] && beside > kBesideMin;
+    for (int k = -kLevelRays / 2 - 1; k <= kLevelRays / 2; ++k) {
+      clear[ray] = clear[ray] && (shown(k) || shown(k + 1));
+    }
+  }
+  return clear;
+}
+
 // (du, dv, growth) by least squares; none when too little of the rim is left.
 std::optional<Move> solved(const std::array<Move, kRays>& rows, const Round& shift,
                            const Mask& keep) {
@@ -284,15 +302,7 @@ bool RimFitter::step(const Picture& picture, Vec2 px, const Colour& weights, con
   for (int ray = 0; ray < kRays; ++ray) {
     usable[ray] = done.edges.usable[ray] && seen[ray];
   }
-  // Levels of a ray beside a covered one are half the cover's.
-  Mask whole = usable;
-  for (int ray = 0; ray < kRays; ++ray) {
-    int beside = 0;
-    for (int k = -2; k <= 2; ++k) {
-      beside += usable[(ray + k + kRays) % kRays] ? 1 : 0;
-    }
-    whole[ray] = usable[ray] && beside > kBesideMin;
-  }
+  const Mask whole = clear_of_cover(usable);
   double information = 0.0;
   for (const double noise : done.edges.noise) {
     information += 1.0 / (noise * noise * kRays);

@@ -7,8 +7,6 @@
 namespace vision {
 namespace {
 
-// Rays over which an edge's two levels are averaged: a sixth of the rim follows a shadow's edge.
-constexpr int kLevelRays = 7;
 constexpr int kGainRays = 9;  // over which gain and noise are
 // How far from the rim an edge is looked for, and how far beyond that its two levels are taken, in
 // radii. The longer, the more noise gets in; blur at 0.5 m/s over 20 ms is 0.17 each way.

@@ -14,6 +14,8 @@ namespace vision {
 
 constexpr int kRays = 48;
 constexpr int kLengths = 3;
+// Rays over which an edge's two levels are averaged: a sixth of the rim follows a shadow's edge.
+constexpr int kLevelRays = 7;
 
 using Round = std::array<double, kRays>;
 using Mask = std::array<bool, kRays>;

@@ -12,8 +12,8 @@ namespace {
 constexpr double kTurn = 6.283185307179586;
 // Rise of the mean response over a mark against its surroundings, DN: a third of a dim mark's.
 constexpr float kRiseMinDn = 3.0F;
-constexpr float kHueCosMin = 0.8F;  // 37 deg: coloured light, white balance, what lies beside
-constexpr int kPeaksMax = 250;      // a mark and picture
+constexpr float kHueCosMin = 0.8F;      // 37 deg: coloured light, white balance, what lies beside
+constexpr int kPeaksMax = 250;          // a mark and picture
 constexpr std::size_t kPlacesMax = 40;  // of them, those that look most like a mark
 constexpr std::size_t kPairsMax = 12;
 // Where inside and outside are tried, radii from the centre.
@@ -165,8 +165,8 @@ void MarkSearch::centre(const Look& look, const Colour& weights, Spot& spot) con
   spot.px = spot.px + move.x * spot.along + move.y * spot.across;
 }
 
-double MarkSearch::loss(const Look& look, const Colour& weights, const Spot& spot,
-                        float cosine) const {
+std::optional<double> MarkSearch::loss(const Look& look, const Colour& weights, const Spot& spot,
+                                       float cosine) const {
   std::vector<float> inside;
   std::vector<float> outside;
   double bright = 0.0;
@@ -193,7 +193,7 @@ double MarkSearch::loss(const Look& look, const Colour& weights, const Spot& spo
   const double shape = share(inside, [&](float value) { return value > middle; }) +
                        share(outside, [&](float value) { return value < middle; }) - 1.0;
   if (!(shape > kShapeMin && high - low > kRiseMinDn)) {
-    return -1.0;
+    return std::nullopt;
   }
   return kShapeLoss * (1.0 - shape) +
          kGroundLoss * std::clamp(ground / std::max(bright, 1.0) - 0.5, 0.0, 3.0) +
@@ -213,9 +213,8 @@ std::array<Places, 2> MarkSearch::places(const Picture& picture, Vec2 origin_px,
         continue;
       }
       centre(look, weights_[k], at);
-      const double lost = loss(look, weights_[k], at, peak.cosine);
-      if (lost >= 0.0) {
-        found[k].push_back({at.px, lost});
+      if (const std::optional<double> lost = loss(look, weights_[k], at, peak.cosine)) {
+        found[k].push_back({at.px, *lost});
       }
     }
     std::stable_sort(found[k].begin(), found[k].end(),

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -55,8 +56,9 @@ class MarkSearch {
   std::array<std::vector<Peak>, 2> peaks(const Picture& picture) const;
   Spot spot(Vec2 px) const;
   void centre(const Look& look, const Colour& weights, Spot& spot) const;
-  // What a place loses; below 0 where it cannot be a mark.
-  double loss(const Look& look, const Colour& weights, const Spot& spot, float cosine) const;
+  // What a place loses; none where it cannot be a mark.
+  std::optional<double> loss(const Look& look, const Colour& weights, const Spot& spot,
+                             float cosine) const;
 
   Camera camera_;
   double radius_m_, height_m_, distance_m_;
