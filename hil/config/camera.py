@@ -139,6 +139,12 @@ class MarksConfig(Section):
         gt=0.0,
         le=100.0,
     )
+    which_m: Vec2 | None = quantity(
+        "m",
+        "world: of several robots alike ours is the one nearest to here when it is first looked "
+        "for, later the one nearest to where it is expected; left out: two are one too many",
+        None,
+    )
     swapped_marks: bool = Field(
         False, description="fault: colours changed over on the robot, the host not told"
     )

@@ -40,6 +40,7 @@ from hil.runs.session import Ending, Parts, Progress, Publish, Session
 from hil.wire.identity import board_hashes
 from hil.wire.link import BoardLink
 from vision.localisers.making import make_localiser
+from vision.spread import spread
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
@@ -258,7 +259,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
         rig=rig,
         link=BoardLink(rig.stream, timeline.link_frame),
         camera_clock=CameraClock(scenario.camera.latency_s),
-        localiser=make_localiser(scenario.camera),
+        localiser=spread(make_localiser(scenario.camera)),
         estimator=make_estimator(control.estimator, control, vehicle.geometry),
         law=WithinWheelSpeed(law or make_law(spec), vehicle, wheel_speed_max_rad_s(scenario)),
         reference=make_reference(scenario.reference),

@@ -20,7 +20,7 @@ from hil.config.camera import MarkConfig, MarksConfig
 from hil.core.types import Pose, PoseMeasurement
 from vision.camera import CameraModel
 from vision.disc_fit import Disc, Marks, RimFitter
-from vision.mark_search import CHROMA_BASIS, Centres, MarkSearch, Window
+from vision.mark_search import CHROMA_BASIS, Centres, MarkSearch, Point, Window
 from vision.pose_fit import weighted_pose
 
 Array = NDArray[np.float64]
@@ -38,9 +38,10 @@ DISTANCE_TOLERANCE = 0.04
 MISFIT_FREEDOM = 4.0
 QUALITY_RESIDUAL = 0.06  # of the radius
 SAME_PLACE_M = 0.02
+TWO_PLACES = "two places look like the robot"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Found:
     """Two discs taken for the robot's marks."""
 
@@ -58,6 +59,7 @@ class MarkLocaliser:
         self._height_m = marks.height_m
         self._radius_m = 0.5 * marks.diameter_m
         self._ground_ratio_max = marks.ground_ratio_max
+        self._which_m = marks.which_m
         self._front_m, self._rear_m = ((m.x_m, m.y_m) for m in (marks.front, marks.rear))
         self._distance_m = math.dist(self._front_m, self._rear_m)
         weights = np.stack([_response(marks.front), _response(marks.rear)])
@@ -75,17 +77,75 @@ class MarkLocaliser:
         of it, else in the whole frame.
         """
         if predicted is not None:
-            centres = self._marks_of(predicted)
-            found, _ = self._measured(image_bgr, centres)
-            if found is None:
-                window = self._window(image_bgr, centres, search_radius_m)
-                found = self._search(image_bgr, window)[0] if window else None
-            if found is not None:
-                return self._measurement(found, in_window=True)
-        found, reason = self._search(image_bgr, (0, 0, image_bgr.shape[1], image_bgr.shape[0]))
+            seen = self.near(image_bgr, predicted, search_radius_m)
+            if seen is not None:
+                return seen
+        whole = (0, 0, image_bgr.shape[1], image_bgr.shape[0])
+        return self.inside(image_bgr, whole, predicted)
+
+    def near(
+        self, image_bgr: Image, predicted: Pose, search_radius_m: float
+    ) -> PoseMeasurement | None:
+        """Return the pose at a prediction or within `search_radius_m` of it, None if not there."""
+        centres = self._marks_of(predicted)
+        found, _ = self._measured(image_bgr, centres)
         if found is None:
+            window = self._window(image_bgr, centres, search_radius_m)
+            finds = self._search(image_bgr, window)[0] if window else []
+            found = self._ours(finds, predicted)
+        return None if found is None else self._measurement(found, in_window=True)
+
+    def inside(
+        self, image_bgr: Image, window: Window, predicted: Pose | None = None
+    ) -> PoseMeasurement:
+        """Return the pose seen in a part of the image; of several alike, the one that is ours."""
+        finds, reason = self._search(image_bgr, window)
+        found = self._ours(finds, predicted)
+        if found is None:
+            reason = TWO_PLACES if finds else reason
             return PoseMeasurement(None, 0.0, reason, details={"window": 0.0})
         return self._measurement(found, in_window=False)
+
+    def ours(self, finds: list[PoseMeasurement], predicted: Pose | None) -> PoseMeasurement | None:
+        """Return which of several finds is our robot; None for none, "not seen" for too many."""
+        if len(finds) < 2:
+            return finds[0] if finds else None
+        place = self._place(predicted)
+        if place is None or any(find.pose is None for find in finds):
+            return PoseMeasurement(None, 0.0, TWO_PLACES, details={"window": 0.0})
+        return min(finds, key=lambda find: _away(find, place))
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of the frames."""
+        return self._model.width_px, self._model.height_px
+
+    @property
+    def span_px(self) -> int:
+        """How long the robot's marks and their rims are together in the image, at most."""
+        width, height = self.size_px
+        spans = [0.0]
+        for u in (0.0, 0.5 * width, float(width)):
+            for v in (0.0, 0.5 * height, float(height)):
+                slope = self._model.floor_jacobian(u, v, self._height_m)
+                if np.isfinite(slope).all():
+                    spans.append(1.0 / float(np.linalg.norm(slope, -2)))
+        return math.ceil(max(spans) * (self._distance_m + 4.0 * self._radius_m))
+
+    def _place(self, predicted: Pose | None) -> Point | None:
+        """Return where our robot is expected among several alike; None where nobody said."""
+        if self._which_m is None or predicted is None:
+            return self._which_m
+        return predicted.x_m, predicted.y_m
+
+    def _ours(self, finds: list[_Found], predicted: Pose | None) -> _Found | None:
+        """Return the find that is our robot; None for none, or where two could be it."""
+        if len(finds) < 2:
+            return finds[0] if finds else None
+        place = self._place(predicted)
+        if place is None:
+            return None
+        return min(finds, key=lambda found: math.dist(np.mean(found.centres_m, axis=0), place))
 
     # -- where to look -------------------------------------------------------------------------
 
@@ -114,23 +174,27 @@ class MarkLocaliser:
 
     # -- coarse --------------------------------------------------------------------------------
 
-    def _search(self, image: Image, window: Window) -> tuple[_Found | None, str]:
-        """Return the robot in a part of the image, or None and the reason."""
+    def _search(self, image: Image, window: Window) -> tuple[list[_Found], str]:
+        """Return what looks like the robot in a part of the image; if nothing, the reason.
+
+        Two at most where nobody said which is ours: one more is one too many.
+        """
         pairs, reason = self._places.pairs(image, window)
-        best, why = None, ""
+        finds: list[_Found] = []
+        why = ""
         for centres in pairs:
-            if best is not None and _near(centres, best, self._radius_m):
+            if any(_near(centres, found, self._radius_m) for found in finds):
                 continue
             found, refusal = self._measured(image, centres)
             why = why or refusal
             if found is None:
                 continue
-            if best is not None and _sharing(found, best):
-                best = min(best, found, key=self._badness)
-            elif best is not None:
-                return None, "two places look like the robot"
-            best = best or found
-        return best, why or reason
+            rivals = [other for other in finds if _sharing(found, other)]
+            best = min([found, *rivals], key=self._badness)
+            finds = [other for other in finds if other not in rivals] + [best]
+            if self._which_m is None and len(finds) > 1:
+                break
+        return finds, why or reason
 
     # -- fine ----------------------------------------------------------------------------------
 
@@ -218,6 +282,12 @@ class MarkLocaliser:
         slope = self._model.floor_jacobian(disc.u_px, disc.v_px, self._height_m)
         spread: Array = slope @ np.array([[uu, uv], [uv, vv]]) @ slope.T
         return spread
+
+
+def _away(find: PoseMeasurement, place_m: Point) -> float:
+    """Return how far a find is from a place, m."""
+    assert find.pose is not None
+    return math.dist((find.pose.x_m, find.pose.y_m), place_m)
 
 
 def _sharing(one: _Found, other: _Found) -> bool:

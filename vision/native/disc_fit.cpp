@@ -30,7 +30,7 @@ constexpr double kRadiusPull = (0.15 / kRadiusSigma) * (0.15 / kRadiusSigma);
 constexpr double kNoiseRatio = 1.3;
 constexpr double kNoiseSlope = 0.4;
 // What no residual shows: lens model, interpolation, light within a profile.
-constexpr double kFreeRatio = 0.001;  // of the radius
+constexpr double kFreeRatio = 0.0008;  // of the radius
 constexpr double kFreePx = 0.004;
 
 using Matrix = std::array<Move, 3>;
