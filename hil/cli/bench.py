@@ -22,10 +22,13 @@ from hil.cli.options import json_option, print_json
               help="vision: write an HTML page with the worst frames there.")  # fmt: skip
 @click.option("--frames", type=click.IntRange(2, 10_000), default=40, show_default=True,
               help="vision: frames of each condition that marks, tags and peers are shown.")  # fmt: skip
+@click.option("--empty", type=click.IntRange(1, 1_000_000), default=10_000, show_default=True,
+              help="vision: frames without the robot, full of things like it.")  # fmt: skip
 @json_option
 def command(
-    what: str, runs: int, candidates: int | None, page: Path | None, frames: int, as_json: bool
-) -> None:
+    what: str, runs: int, candidates: int | None, page: Path | None, frames: int, empty: int,
+    as_json: bool,
+) -> None:  # fmt: skip
     """Measure the speed of the harness, or compare the wheel laws of the board.
 
     \b
@@ -47,14 +50,14 @@ def command(
     elif what == "wheels":
         _compare_wheels(runs, as_json)
     elif what == "vision":
-        _measure_vision(frames, page, as_json)
+        _measure_vision(frames, empty, page, as_json)
     elif what == "firmware":
         _measure_firmware(as_json)
     else:
         _measure_speed(what, runs, as_json)
 
 
-def _measure_vision(frames: int, page: Path | None, as_json: bool) -> None:
+def _measure_vision(frames: int, without: int, page: Path | None, as_json: bool) -> None:
     from dataclasses import asdict
 
     from hil.tools import bench_peers, bench_vision
@@ -63,7 +66,7 @@ def _measure_vision(frames: int, page: Path | None, as_json: bool) -> None:
         click.echo(text, err=True)
 
     rows = bench_vision.table(100, progress)
-    empty = bench_vision.empty_scenes(10_000, progress)
+    empty = bench_vision.empty_scenes(without, progress)
     shown = list(bench_peers.lines(frames, progress))
     peers = [line for lines, _ in shown for line in lines]
     if page is not None:

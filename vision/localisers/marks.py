@@ -37,6 +37,8 @@ DISTANCE_TOLERANCE = 0.04
 # How many degrees of freedom the discs' own claims are worth against that of their distance.
 MISFIT_FREEDOM = 4.0
 QUALITY_RESIDUAL = 0.06  # of the radius
+# What is hardly within each limit is no robot: the least of extreme blur and noise has 0.17.
+QUALITY_MIN = 0.06
 SAME_PLACE_M = 0.02
 TWO_PLACES = "two places look like the robot"
 
@@ -220,7 +222,18 @@ class MarkLocaliser:
                 None,
                 f"marks {own_mm + 1e3 * gap_m:.0f} mm apart, the robot's are {own_mm:.0f} mm",
             )
-        return _Found(discs, (front, rear), gap_m, spreads), ""
+        found = _Found(discs, (front, rear), gap_m, spreads)
+        quality = self._quality(found)
+        if not quality >= QUALITY_MIN:
+            return None, f"rims and distance fit badly together: {quality:.3f}, limit {QUALITY_MIN}"
+        return found, ""
+
+    def _quality(self, found: _Found) -> float:
+        """Return the smaller share of rim times how well rims and distance fit; 1 is whole and sharp."""
+        share = min(disc.share for disc in found.discs)
+        sharp = max(disc.residual_px / disc.radius_px for disc in found.discs) / QUALITY_RESIDUAL
+        misfit = found.gap_m / (DISTANCE_TOLERANCE * self._distance_m)
+        return share * math.exp(-0.5 * sharp**2 - misfit**2)
 
     def _refusal(self, disc: Disc) -> str:
         """Return why a disc cannot be a mark, "" when it can."""
@@ -247,11 +260,9 @@ class MarkLocaliser:
         # Marks further off their distance than they claim: both claims are too small.
         covariance *= (MISFIT_FREEDOM + misfit2) / (MISFIT_FREEDOM + 1.0)
         residual_m = 0.5 * abs(found.gap_m)
-        sharp = max(disc.residual_px / disc.radius_px for disc in found.discs) / QUALITY_RESIDUAL
-        misfit = found.gap_m / (DISTANCE_TOLERANCE * self._distance_m)
         return PoseMeasurement(
             pose,
-            quality=min(front.share, rear.share) * math.exp(-0.5 * sharp**2 - misfit**2),
+            quality=self._quality(found),
             sigma_xy_m=math.sqrt(0.5 * (covariance[0, 0] + covariance[1, 1])),
             sigma_theta_rad=math.sqrt(covariance[2, 2]),
             covariance=tuple(covariance[np.triu_indices(3)].tolist()),
