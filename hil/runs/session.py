@@ -320,6 +320,8 @@ class Session:
         A frame whose stamp the camera's clock refuses is recorded and not looked at.
         """
         parts, clock = self._parts, self._parts.camera_clock
+        if frame.note:
+            self._note("camera", frame.note)
         stamped = clock.arrival(frame.t_cam_s, now_s)
         exposure_s = clock.to_host_s(frame.t_cam_s)
         if clock.restarts != self._camera_restarts:
