@@ -39,6 +39,8 @@ HOST_START_S = 1000.0
 # Poses handed to the renderer over one exposure, an odd number so that one is at its middle:
 # 0.75 mm apart at 0.5 m/s and 6 ms.
 POSES_PER_EXPOSURE = 5
+# And over all rows of a rolling shutter: 15 ms more at 30 us a row.
+POSES_PER_READOUT = 17
 
 
 class FrameMaker(Protocol):
@@ -144,6 +146,7 @@ class Twin:
         self._shutter = Shutter(setup.camera, rng("shutter"), HOST_START_S)
         self._now_s = HOST_START_S
         self._uplink: deque[tuple[float, bytes]] = deque()
+        self._readout_s = setup.camera.line_time_s * (setup.camera.height_px - 1)
         self._exposed: deque[tuple[Exposure, tuple[PoseTuple, ...]]] = deque()
         self._last_frame: Frame | None = None
         self._set_spans(math.inf)
@@ -271,10 +274,11 @@ class Twin:
                 return ()
         if self._maker is None:
             return (self._pose_at(0.5 * (exposure.start_s + exposure.end_s)),)
-        step_s = (exposure.end_s - exposure.start_s) / (POSES_PER_EXPOSURE - 1)
-        return tuple(
-            self._pose_at(exposure.start_s + i * step_s) for i in range(POSES_PER_EXPOSURE)
-        )
+        # A rolling shutter's first and last rows are exposed earlier and later than the middle one.
+        rows_s = 0.5 * self._readout_s
+        count = POSES_PER_EXPOSURE if rows_s == 0.0 else POSES_PER_READOUT
+        step_s = (exposure.end_s - exposure.start_s + 2.0 * rows_s) / (count - 1)
+        return tuple(self._pose_at(exposure.start_s - rows_s + i * step_s) for i in range(count))
 
 
 def _kernel_us(t_s: float) -> int:

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from hil.record.memory import RunSink
     from hil.record.timeline import Timeline
     from hil.wire.link import BoardLink, WheelReport
-    from vision.tracker import Localiser
+    from vision.rolling import unrolled
+from vision.tracker import Localiser
 
 # Poses and time exchanges wanted before the start; both ties are then good to a few ms.
 _POSES_WANTED = 15
@@ -359,11 +360,10 @@ class Session:
             return frame.pose
         assert frame.image is not None
         before = self._parts.estimator.estimate_at(exposure_s)
-        return self._parts.localiser.locate(
-            frame.image,
-            before.pose if before is not None else None,
-            self._scenario.camera.search_radius_m,
-        )
+        camera = self._scenario.camera
+        predicted = before.pose if before is not None else None
+        seen = self._parts.localiser.locate(frame.image, predicted, camera.search_radius_m)
+        return unrolled(seen, camera, before)
 
     def _estimate(self, t_effect_s: float) -> Estimate:
         """Return the state at the actuation time, inside the fence; else RigFault."""
