@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from hil.config.camera import CameraConfig, MarkConfig
-from hil.core.types import Estimate, Pose, PoseMeasurement
 from vision.pose_fit import fit_pose
+
+if TYPE_CHECKING:
+    from hil.config.camera import CameraConfig, MarkConfig
+    from hil.core.types import Estimate, Pose, PoseMeasurement
 
 Point = tuple[float, float]
 

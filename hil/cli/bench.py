@@ -60,6 +60,7 @@ def command(
 def _measure_vision(frames: int, without: int, page: Path | None, as_json: bool) -> None:
     from dataclasses import asdict
 
+    from hil.core.files import replace_file
     from hil.tools import bench_peers, bench_vision
 
     def progress(text: str) -> None:
@@ -70,9 +71,8 @@ def _measure_vision(frames: int, without: int, page: Path | None, as_json: bool)
     shown = list(bench_peers.lines(frames, progress))
     peers = [line for lines, _ in shown for line in lines]
     if page is not None:
-        part = page.with_name(page.name + ".part")
-        part.write_text(bench_peers.as_page(peers, [worst for _, worst in shown]))
-        part.replace(page)
+        text = bench_peers.as_page(peers, [worst for _, worst in shown])
+        replace_file(page, text.encode("utf-8"))
     if as_json:
         document = bench_vision.as_document(rows, empty)
         print_json({**document, "peers": [asdict(line) for line in peers]})

@@ -20,6 +20,7 @@ from hil.runs.plausibility import Plausibility
 from hil.runs.supervision import Supervisor
 from hil.wire import handshake
 from hil.wire.refusal import refused_set_point
+from vision.rolling import unrolled
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
@@ -31,8 +32,7 @@ if TYPE_CHECKING:
     from hil.record.memory import RunSink
     from hil.record.timeline import Timeline
     from hil.wire.link import BoardLink, WheelReport
-    from vision.rolling import unrolled
-from vision.tracker import Localiser
+    from vision.tracker import Localiser
 
 # Poses and time exchanges wanted before the start; both ties are then good to a few ms.
 _POSES_WANTED = 15
