@@ -16,6 +16,8 @@ from vision import cv_compat
 from vision.camera_watch import FrameWatch
 from vision.sources import CameraControls, ImageFolder, LiveCamera, VideoFile
 
+pytestmark = pytest.mark.realtime
+
 PERIOD_S = 0.02
 
 

@@ -1,15 +1,16 @@
-// One side's wheels: speed from the encoder, the two wheel laws of docs/wheel-loop.md, limits.
+// One side's wheels: speed from the encoder, a wheel law of docs/wheel-loop.md, limits.
 // Signs: positive duty, PWM and speed drive forward and make counts rise. Duty is a ratio, -1 to 1.
 #ifndef HIL_CORE_WHEEL_LOOP_H
 #define HIL_CORE_WHEEL_LOOP_H
 
 #include <stdint.h>
 
-#include "params.h"
 #include "super_twisting.h"
+#include "wheel_laws.h"
 
 namespace hil {
 
+<<<<<<< HEAD
 enum class Law : uint8_t { ASG_ISM = 0,
                            PID = 1 };
 enum class Form : uint8_t { INTEGRAL = 0,
@@ -21,6 +22,8 @@ enum class Start : uint8_t { RUNNING,
                              RETUNED,
                              STEPPED };
 
+=======
+>>>>>>> main
 // Everything a tick needs of the parameters, divided and rooted beforehand; shared by both sides.
 struct WheelTuning {
   SuperTwistingGains st;
@@ -31,6 +34,7 @@ struct WheelTuning {
   float ff_duty_s_rad, ff_dead_duty, ff_inv_dead_s_rad;
   float hold_setpoint_rad_s, hold_omega_rad_s;
   Law law;
+<<<<<<< HEAD
   Form form;
   float bump_keep;  // share of the transfer offset left after one tick
   float sigma, sigma_tick, average_max, mu0_s, mu_start, eps0, eps_min;
@@ -38,11 +42,18 @@ struct WheelTuning {
   float eps_until_s;  // value of t + mu0 from which eps(t) is at its floor
   float two_g, two_k0, gamma0, gamma1, gamma2, step_rad_s;
   float kp, ki, kd;
+=======
+#define WHEEL_LAW(ID, files, name, doc) wheel_##files::Tuning files;
+#include "laws.def"
+#undef WHEEL_LAW
+  float bump_keep;         // share of the transfer offset left after one tick
+>>>>>>> main
   int16_t pwm_max_counts, slew_counts;
 };
 
 WheelTuning wheel_tuning(const Params& params);
 
+<<<<<<< HEAD
 // Sliding variable and the terms it is made of, docs/wheel-loop.md.
 struct Sliding {
   float t_mu0_s;   // t + mu0; t restarts at arming and when the set-point steps
@@ -84,6 +95,19 @@ struct Wheel {
   bool holding;            // zero set-point and slow: bridge off
   Start start;             // of the next tick
   int16_t pwm;             // applied, -PWM_TOP to PWM_TOP
+=======
+struct Wheel : Tracked {
+  int32_t last_counts;
+  SuperTwisting st;
+#define WHEEL_LAW(ID, files, name, doc) wheel_##files::State files;
+#include "laws.def"
+#undef WHEEL_LAW
+  float feedback_duty;  // law plus transfer offset, without feed-forward
+  float duty;           // wanted, before the limits
+  float bump_duty;      // transfer offset, decays
+  bool holding;         // zero set-point and slow: bridge off
+  int16_t pwm;          // applied, -PWM_TOP to PWM_TOP
+>>>>>>> main
 };
 
 void wheel_init(Wheel& w, const WheelTuning& t, int32_t counts);
@@ -95,6 +119,8 @@ void wheel_estimate(Wheel& w, const WheelTuning& t, int32_t counts);
 void wheel_control(Wheel& w, const WheelTuning& t, float setpoint_rad_s);
 // Rounds to PWM counts, limits range and slew, notes saturation. Float operations: 4; 700 cycles.
 void wheel_limit(Wheel& w, const WheelTuning& t);
+// Sliding variable of the law in force, for the telemetry; 0 where it has none.
+float wheel_sliding(const Wheel& w, const WheelTuning& t);
 // Bridge off at once, law ready to start anew.
 void wheel_off(Wheel& w);
 // Law or gains have changed: the output of a running wheel continues where it is.
