@@ -248,7 +248,8 @@ void bind_differentiator(nb::module_& m) {
 
 void bind_encoder(nb::module_& m) {
   nb::class_<hil::Quadrature>(m, "Quadrature")
-      .def("__init__", [](hil::Quadrature* q, uint8_t ab) { new (q) hil::Quadrature{ab, 0, 0}; }, "ab"_a = 0)
+      .def("__init__",
+           [](hil::Quadrature* q, uint8_t ab) { new (q) hil::Quadrature{ab, 0, 0}; }, "ab"_a = 0)
       .def("update", [](hil::Quadrature& q, uint8_t ab) { hil::quadrature_update(q, ab); }, "ab"_a)
       .def_ro("counts", &hil::Quadrature::counts)
       .def_ro("illegal", &hil::Quadrature::illegal);
@@ -320,9 +321,6 @@ void bind_facts(nb::module_& m) {
       .def_ro("doc", &Parameter::doc)
       .def_ro("live", &Parameter::live);
   m.def("parameter_table", &parameter_table);
-<<<<<<< HEAD
-  m.def("parameter_hash", [](const Values& values) { return hil::params_hash(params_of(values)); }, "parameters"_a = Values{});
-=======
   nb::class_<WheelLawName>(m, "WheelLawName")
       .def_ro("name", &WheelLawName::name)
       .def_ro("doc", &WheelLawName::doc)
@@ -330,7 +328,6 @@ void bind_facts(nb::module_& m) {
   m.def("wheel_laws", &wheel_laws);
   m.def("parameter_hash", [](const Values& values) { return hil::params_hash(params_of(values)); },
         "parameters"_a = Values{});
->>>>>>> main
   m.def("dialect_hash", &hil::dialect_hash);
   m.def("safety_next", &hil::safety_next, "state"_a, "conditions"_a);
   m.def("safety_reason", &hil::safety_reason, "conditions"_a);

@@ -43,9 +43,9 @@ class BoardSide {
 };
 
 struct HostBoardOptions {
-  double clock_ppm = 0.0;            // board clock fast against true time
-  std::uint32_t clock_start_us = 0;  // board clock when the run begins
-  double byte_us = 10e6 / 57600.0;   // UART time of one byte
+  double clock_ppm = 0.0;             // board clock fast against true time
+  std::uint32_t clock_start_us = 0;   // board clock when the run begins
+  double byte_us = 10e6 / 57600.0;    // UART time of one byte
 };
 
 class HostBoard final : public BoardSide {
@@ -60,7 +60,7 @@ class HostBoard final : public BoardSide {
 
  private:
   std::uint32_t clock_us(double t_us) const;
-  void catch_up(double t_us);  // edges and received bytes up to t_us
+  void catch_up(double t_us);   // edges and received bytes up to t_us
   void tick(double t_us, double battery_v);
   void transmit(double t_us);
 
@@ -73,10 +73,10 @@ class HostBoard final : public BoardSide {
   std::deque<Chunk> received_;
   std::vector<std::uint8_t> eeprom_;  // as it comes new; keeps what it holds through a reset
   bool held_ = true;
-  double boot_us_ = 0.0;  // true time at which the board's clock showed clock_boot_us_
+  double boot_us_ = 0.0;            // true time at which the board's clock showed clock_boot_us_
   std::uint32_t clock_boot_us_ = 0;
   std::int64_t ticks_ = 0;
-  double uart_free_us_ = 0.0;  // when the last byte given to the UART will have left
+  double uart_free_us_ = 0.0;       // when the last byte given to the UART will have left
 };
 
 }  // namespace twin

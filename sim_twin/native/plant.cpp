@@ -24,16 +24,16 @@ inline PairedState moved(const PairedState& x, double h, const PairedState& dx) 
 }
 
 PairedState paired(const StateVector& x) {
-  return {Pair{x[kX], x[kY]}, Pair{x[kTheta], x[kThetaDot]},
-          Pair{x[kEta1], x[kEta2]}, Pair{x[kCurrentL], x[kCurrentR]},
+  return {Pair{x[kX], x[kY]},           Pair{x[kTheta], x[kThetaDot]},
+          Pair{x[kEta1], x[kEta2]},     Pair{x[kCurrentL], x[kCurrentR]},
           Pair{x[kWheelL], x[kWheelR]}, Pair{x[kOmegaL], x[kOmegaR]},
           Pair{x[kCharge], 0.0}};
 }
 
 StateVector listed(const PairedState& x) {
-  return {x[kPosition][0], x[kPosition][1], x[kTurn][0], x[kEta][0], x[kEta][1],
-          x[kTurn][1], x[kCurrent][0], x[kCurrent][1], x[kWheel][0], x[kWheel][1],
-          x[kOmega][0], x[kOmega][1], x[kBattery][0]};
+  return {x[kPosition][0], x[kPosition][1], x[kTurn][0],  x[kEta][0],   x[kEta][1],
+          x[kTurn][1],     x[kCurrent][0],  x[kCurrent][1], x[kWheel][0], x[kWheel][1],
+          x[kOmega][0],    x[kOmega][1],    x[kBattery][0]};
 }
 
 }  // namespace
@@ -195,15 +195,15 @@ Plant::Acceleration Plant::constrained(const PairedState& x, const Sides& both,
   const Pair axle_m = {p_.front_axle_m, -p_.rear_axle_m};
   const Pair slide_n = grip(load) * Pair{d_.slide_front_n, d_.slide_rear_n} *
                        soft_sign(eta2 + axle_m * w, p_.floor_smoothing_m_s);
-  const double lateral_n = sum(slide_n);           // F_y
-  const double scrub_n_m = sum(axle_m * slide_n);  // in M_r
+  const double lateral_n = sum(slide_n);              // F_y
+  const double scrub_n_m = sum(axle_m * slide_n);     // in M_r
 
   const double push_x = load[kForceForward] + m * gravity[0];
   const double push_y = load[kForceLeft] + m * gravity[1];
   Acceleration acc;
   acc.eta1_dot = (sum(rim_n) + push_x + m * eta2 * w) * d_.per_mass_rim + load[kAccForward];
   double moment = half * (rim_n[1] - rim_n[0]) - scrub_n_m + load[kTorqueYaw] +
-                  d0 * (lateral_n - push_y + m * eta1 * w);
+                        d0 * (lateral_n - push_y + m * eta1 * w);
   if (p_.castor) {
     const Pair drag_n = castor_drag(x, grip(load), p_.floor_smoothing_m_s);
     acc.eta1_dot -= drag_n[0] * d_.per_mass_rim;

@@ -14,21 +14,18 @@ namespace twin {
 #define TWIN_INLINE [[gnu::always_inline]] inline
 
 // One list: C++ fields, their Python names, and what a caller must set (no defaults).
-#define TWIN_PLANT_PARAMETERS(X)                                                                                     \
-  X(mass_kg)                                                                                                         \
-  X(inertia_kg_m2)                                                                                                   \
-  X(wheel_radius_m)                                                                                                  \
-  X(track_m) X(front_axle_m) X(rear_axle_m)                                                                          \
-      X(d0_m) X(wheel_inertia_kg_m2)                                                                                 \
-          X(motor_per_side) X(motor_resistance_ohm) X(motor_inductance_h)                                            \
-              X(motor_torque_constant_n_m_a) X(motor_emf_constant_v_s_rad) X(motor_gear_ratio)                       \
-                  X(motor_gear_efficiency_ratio) X(motor_rotor_inertia_kg_m2) X(motor_coulomb_n_m)                   \
-                      X(motor_stiction_n_m) X(motor_stribeck_rad_s) X(motor_viscous_n_m_s_rad)                       \
-                          X(bridge_drop_v) X(bridge_resistance_ohm) X(bridge_smoothing_a)                            \
-                              X(battery_full_v) X(battery_empty_v) X(battery_capacity_a_h) X(battery_resistance_ohm) \
-                                  X(battery_charge_start_ratio) X(battery_idle_a)                                    \
-                                      X(floor_rolling_ratio) X(floor_friction_ratio) X(floor_smoothing_m_s)          \
-                                          X(floor_slip_smoothing_m_s)
+#define TWIN_PLANT_PARAMETERS(X)                                                              \
+  X(mass_kg) X(inertia_kg_m2) X(wheel_radius_m) X(track_m) X(front_axle_m) X(rear_axle_m)    \
+  X(d0_m) X(wheel_inertia_kg_m2)                                                              \
+  X(motor_per_side) X(motor_resistance_ohm) X(motor_inductance_h)                             \
+  X(motor_torque_constant_n_m_a) X(motor_emf_constant_v_s_rad) X(motor_gear_ratio)            \
+  X(motor_gear_efficiency_ratio) X(motor_rotor_inertia_kg_m2) X(motor_coulomb_n_m)            \
+  X(motor_stiction_n_m) X(motor_stribeck_rad_s) X(motor_viscous_n_m_s_rad)                    \
+  X(bridge_drop_v) X(bridge_resistance_ohm) X(bridge_smoothing_a)                             \
+  X(battery_full_v) X(battery_empty_v) X(battery_capacity_a_h) X(battery_resistance_ohm)      \
+  X(battery_charge_start_ratio) X(battery_idle_a)                                             \
+  X(floor_rolling_ratio) X(floor_friction_ratio) X(floor_smoothing_m_s)                       \
+  X(floor_slip_smoothing_m_s)
 
 struct PlantParams {
 #define X(name) double name = 0.0;
@@ -44,19 +41,12 @@ struct PlantParams {
 
 // Index of each state in the vector that is integrated.
 enum State : int {
-  kX,
-  kY,
-  kTheta,  // m, m, rad: centre of mass in the world
-  kEta1,
-  kEta2,
-  kThetaDot,  // m/s, m/s, rad/s: body frame; eta2 = -d0 theta_dot unless slip
-  kCurrentL,
-  kCurrentR,  // A, one motor of each side
-  kWheelL,
-  kWheelR,  // rad, wheel angles
-  kOmegaL,
-  kOmegaR,  // rad/s, wheel speeds; follow from eta unless slip
-  kCharge,  // 0..1
+  kX, kY, kTheta,              // m, m, rad: centre of mass in the world
+  kEta1, kEta2, kThetaDot,     // m/s, m/s, rad/s: body frame; eta2 = -d0 theta_dot unless slip
+  kCurrentL, kCurrentR,        // A, one motor of each side
+  kWheelL, kWheelR,            // rad, wheel angles
+  kOmegaL, kOmegaR,            // rad/s, wheel speeds; follow from eta unless slip
+  kCharge,                     // 0..1
   kStates
 };
 using StateVector = std::array<double, kStates>;
@@ -66,10 +56,8 @@ enum PairIndex : int {
   kPosition,  // X, Y
   kTurn,      // theta, theta_dot
   kEta,       // eta1, eta2
-  kCurrent,
-  kWheel,
-  kOmega,    // left, right
-  kBattery,  // charge, nothing
+  kCurrent, kWheel, kOmega,  // left, right
+  kBattery,   // charge, nothing
   kPairs
 };
 using PairedState = std::array<Pair, kPairs>;
@@ -80,30 +68,30 @@ using PairedState = std::array<Pair, kPairs>;
 // when positive, also at rest; a brake opposes the wheel's motion whichever way (below 0 it is 0);
 // slopes raise the floor along world X and Y; the friction change is added to 1 (below 0 it is 0), and
 // the sag takes the battery down to 0 V at most.
-#define TWIN_LOADS(X)                         \
-  X(kAccForward, "eta1_dot_m_s2")             \
-  X(kAccLateral, "eta2_dot_m_s2")             \
-  X(kAccYaw, "theta_ddot_rad_s2")             \
-  X(kForceForward, "force_forward_n")         \
-  X(kForceLeft, "force_left_n")               \
-  X(kTorqueYaw, "torque_yaw_n_m")             \
-  X(kLoadLeft, "load_left_n_m")               \
-  X(kLoadRight, "load_right_n_m")             \
-  X(kBrakeLeft, "brake_left_n_m")             \
-  X(kBrakeRight, "brake_right_n_m")           \
-  X(kSlopeX, "slope_x_rad")                   \
-  X(kSlopeY, "slope_y_rad")                   \
+#define TWIN_LOADS(X)                       \
+  X(kAccForward, "eta1_dot_m_s2")           \
+  X(kAccLateral, "eta2_dot_m_s2")           \
+  X(kAccYaw, "theta_ddot_rad_s2")           \
+  X(kForceForward, "force_forward_n")       \
+  X(kForceLeft, "force_left_n")             \
+  X(kTorqueYaw, "torque_yaw_n_m")           \
+  X(kLoadLeft, "load_left_n_m")             \
+  X(kLoadRight, "load_right_n_m")           \
+  X(kBrakeLeft, "brake_left_n_m")           \
+  X(kBrakeRight, "brake_right_n_m")         \
+  X(kSlopeX, "slope_x_rad")                 \
+  X(kSlopeY, "slope_y_rad")                 \
   X(kFrictionChange, "friction_change_ratio") \
   X(kBatterySag, "battery_sag_v")
 enum Load : int {
 #define X(id, name) id,
   TWIN_LOADS(X)
 #undef X
-      kLoads
+  kLoads
 };
 using LoadVector = std::array<double, kLoads>;
 
-struct Drive {             // left, right; held over a step
+struct Drive {  // left, right; held over a step
   Pair duty = {0.0, 0.0};  // -1..1
   Pair jam = {0.0, 0.0};   // N m s/rad, gear jam as a stiff damper
 };
@@ -121,8 +109,8 @@ class Plant {
 
   const StateVector& state() const { return x_; }
   StateVector& state() { return x_; }
-  double battery_v(const Drive& drive, double sag_v) const;   // at the terminals, now
-  double charge_after(double h_s, const Drive& drive) const;  // at the current drawn now
+  double battery_v(const Drive& drive, double sag_v) const;  // at the terminals, now
+  double charge_after(double h_s, const Drive& drive) const; // at the current drawn now
   StateVector derivative(const StateVector& x, const Drive& drive, const LoadVector& load) const;
 
  private:
@@ -140,13 +128,13 @@ class Plant {
   // Quotients that do not change, because a division costs as much as ten products.
   struct Derived {
     double per_radius, per_inductance, per_stribeck, per_charge;
-    double side_inertia;                   // kg m^2, wheels and reflected rotors of one side
-    double emf_v_s, gear_n_m_a;            // V per rad/s and N m per A at the wheel
-    double weight_n;                       // m g
-    double roll_n;                         // rolling resistance of one side
-    double slide_front_n, slide_rear_n;    // sliding friction of the wheels in front, in the rear
-    double castor_n;                       // friction of the castor
-    double per_mass_rim, per_inertia_rim;  // 1 / (m + rims), 1 / (I + m d0^2 + rims): (S'MS)^-1
+    double side_inertia;              // kg m^2, wheels and reflected rotors of one side
+    double emf_v_s, gear_n_m_a;       // V per rad/s and N m per A at the wheel
+    double weight_n;                  // m g
+    double roll_n;                    // rolling resistance of one side
+    double slide_front_n, slide_rear_n;   // sliding friction of the wheels in front, in the rear
+    double castor_n;                      // friction of the castor
+    double per_mass_rim, per_inertia_rim; // 1 / (m + rims), 1 / (I + m d0^2 + rims): (S'MS)^-1
   };
 
   struct Heading {

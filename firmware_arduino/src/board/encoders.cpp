@@ -51,7 +51,7 @@ void start() {
   // Pull-ups suit open-collector encoders and do no harm to driven ones.
   PORTD |= _BV(pins::kLeftEncoderA) | _BV(pins::kLeftEncoderB);
   PORTE |= _BV(pins::kRightEncoderA) | _BV(pins::kRightEncoderB);
-  _delay_us(10);                    // for the pull-ups to charge the leads before the first look
+  _delay_us(10);  // for the pull-ups to charge the leads before the first look
   EICRA = _BV(ISC00) | _BV(ISC10);  // any edge
   EICRB = _BV(ISC40) | _BV(ISC50);
   g_left.last_ab = left_ab();

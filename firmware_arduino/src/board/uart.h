@@ -6,9 +6,7 @@
 namespace hil {
 namespace uart {
 
-enum Port : uint8_t { kUsb,
-                      kBluetooth,
-                      kPorts };
+enum Port : uint8_t { kUsb, kBluetooth, kPorts };
 
 constexpr uint32_t kBaud = 57600;
 

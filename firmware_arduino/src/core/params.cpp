@@ -41,7 +41,8 @@ bool in_range(const ParamSpec& spec, float value) {
 }
 
 constexpr uint32_t after_names(uint32_t state, uint8_t from = 0) {
-  return from == PARAM_COUNT ? state : after_names(after_name(state, SPECS[from].name), static_cast<uint8_t>(from + 1));
+  return from == PARAM_COUNT ? state : after_names(after_name(state, SPECS[from].name),
+                                                   static_cast<uint8_t>(from + 1));
 }
 constexpr uint32_t NAMES_HASH = ~after_names(0xFFFFFFFFu);
 

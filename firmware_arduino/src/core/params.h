@@ -27,11 +27,7 @@ struct ParamSpec {
   uint32_t name_crc;  // CRC-32 over `name`
 };
 
-enum class ParamResult : uint8_t { SET,
-                                   UNKNOWN,
-                                   NOT_FINITE,
-                                   OUT_OF_RANGE,
-                                   FIXED_WHILE_ARMED };
+enum class ParamResult : uint8_t { SET, UNKNOWN, NOT_FINITE, OUT_OF_RANGE, FIXED_WHILE_ARMED };
 
 ParamSpec param_spec(uint8_t index);
 // Index of a name that is zero-terminated or exactly 16 long; PARAM_COUNT when unknown.
@@ -53,9 +49,7 @@ uint32_t param_hash_term(const Params& params, uint8_t index);
 // images the one with the newer serial counts, in circular order.
 constexpr uint8_t IMAGE_VERSION = 1;
 constexpr uint16_t IMAGE_SIZE = 8 + sizeof(Params) + 4;
-enum class ImageResult : uint8_t { LOADED,
-                                   BLANK,
-                                   DAMAGED };
+enum class ImageResult : uint8_t { LOADED, BLANK, DAMAGED };
 // Writes all but the CRC at the end, which whoever hands the bytes out works out as they go.
 void params_encode(const Params& params, uint8_t serial, uint8_t (&image)[IMAGE_SIZE]);
 // Takes the image whole or not at all: anything but LOADED leaves the defaults in `params`.

@@ -33,12 +33,12 @@ static_assert(static_cast<uint8_t>(Text::COUNT) <= 8 * TEXT_BYTES, "one bit per 
 static_assert(sizeof(HIL_BUILD_ID) <= 9, "eight characters of build id");
 
 // Packs a message of the dialect and queues it behind room for a wheel state.
-#define HIL_SEND(b, name, fields)                                                             \
-  do {                                                                                        \
-    mavlink_message_t message;                                                                \
-    mavlink_msg_##name##_encode_status(BOARD_SYSTEM_ID, BOARD_COMPONENT_ID, &(b).link.status, \
-                                       &message, &(fields));                                  \
-    link_send((b).link, message, WHEEL_STATE_ROOM);                                           \
+#define HIL_SEND(b, name, fields)                                                              \
+  do {                                                                                         \
+    mavlink_message_t message;                                                                 \
+    mavlink_msg_##name##_encode_status(BOARD_SYSTEM_ID, BOARD_COMPONENT_ID, &(b).link.status,  \
+                                       &message, &(fields));                                   \
+    link_send((b).link, message, WHEEL_STATE_ROOM);                                            \
   } while (false)
 
 uint8_t wheel_flags(const Board& b) {

@@ -135,8 +135,7 @@ SafetyLimits safety_limits(const Params& p) {
   l.setpoint_age_us = static_cast<uint32_t>(p.setpoint_timeout_ms * 1000.0f) - TICK_US;
   l.battery_low_mv = static_cast<uint16_t>(p.battery_low_v * 1000.0f + 0.5f);
   l.battery_good_mv = p.battery_low_v > 0.0f
-                          ? static_cast<uint16_t>((p.battery_low_v + p.battery_hysteresis_v) * 1000.0f + 0.5f)
-                          : 0;
+      ? static_cast<uint16_t>((p.battery_low_v + p.battery_hysteresis_v) * 1000.0f + 0.5f) : 0;
   l.battery_ticks = ticks_of(p.battery_debounce_ms);
   l.stall_ticks = ticks_of(p.stall_ms);
   l.pause_ticks = static_cast<uint16_t>(pause_ticks(p));

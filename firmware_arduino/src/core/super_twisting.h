@@ -6,17 +6,15 @@
 
 namespace hil {
 
-enum class Scheme : uint8_t { EXPLICIT = 0,
-                              SEMI_IMPLICIT = 1,
-                              IMPLICIT = 2 };
+enum class Scheme : uint8_t { EXPLICIT = 0, SEMI_IMPLICIT = 1, IMPLICIT = 2 };
 
 // What one step may take off x1 and x2 for a given L, worked out off the tick.
 struct SuperTwistingSteps {
   float root;     // dt l1 sqrt(L): weight of |e|^(1/2) in x1
   float root_sq;  // its square
   float half_root, quarter_root_sq;
-  float sign;   // dt^2 l0 L: what the sign term does to x1 through x2 in one step
-  float slope;  // dt l0 L: what the sign term takes off x2
+  float sign;     // dt^2 l0 L: what the sign term does to x1 through x2 in one step
+  float slope;    // dt l0 L: what the sign term takes off x2
 };
 
 struct SuperTwistingGains {
@@ -27,8 +25,8 @@ struct SuperTwistingGains {
   float cell;   // half width of the measurement's quantisation cell, units of x
   float l_max;  // units of x per s^2
   float l_min;
-  float grow;                // dt rho_k
-  float alpha;               // equivalent sign above which L grows
+  float grow;   // dt rho_k
+  float alpha;  // equivalent sign above which L grows
   SuperTwistingSteps steps;  // for l_max
 };
 

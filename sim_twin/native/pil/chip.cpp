@@ -157,7 +157,7 @@ void Chip::check_alive() const {
 void Chip::run_to(Cycle end) {
   if (end <= avr_->cycle) return;
   const Cycle limit = profiler_.running() ? 0 : kRunLimit;  // 0: one instruction a call
-  const auto arm_barrier = [&] {                            // the processor must not sleep past the end
+  const auto arm_barrier = [&] {  // the processor must not sleep past the end
     avr_cycle_timer_register(avr_, end > avr_->cycle ? end - avr_->cycle : 1, on_barrier, this);
   };
   avr_->run_cycle_limit = limit;
