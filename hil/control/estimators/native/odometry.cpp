@@ -82,7 +82,7 @@ void WheelSpeeds::step(double dt_s, const Sides& turned_rad, const std::vector<P
     short_[side] -= r2 * k * error;
   }
   p_ = {n00 * (1.0 - n00 * k), n01 * (1.0 - n00 * k), r2 * (1.0 - n00 * k),
-        n11 - n01 * n01 * k, t2 - n01 * r2 * k, n22 - r2 * r2 * k};
+        n11 - n01 * n01 * k,   t2 - n01 * r2 * k,     n22 - r2 * r2 * k};
 }
 
 }  // namespace estimator
