@@ -38,7 +38,7 @@ DISTANCE_TOLERANCE = 0.04
 MISFIT_FREEDOM = 4.0
 QUALITY_RESIDUAL = 0.06  # of the radius
 # What is hardly within each limit is no robot: the least of extreme blur and noise has 0.17.
-QUALITY_MIN = 0.06
+QUALITY_MIN = 0.12
 SAME_PLACE_M = 0.02
 TWO_PLACES = "two places look like the robot"
 
