@@ -37,11 +37,15 @@ class Channel:
     """One direction of the link behind the serial port; chunks arrive in the order they left.
 
     Loss is a two-state chain (Gilbert): in its bad state every chunk is lost. `cuts` are the times
-    (start, end) between which nothing passes, chunks on their way included.
+    (start, end) between which nothing passes, chunks on their way included. Within `doubles` every
+    chunk arrives twice; within `swaps` one waits for the next one, and arrives behind it.
     """
 
     def __init__(self, config: LinkConfig, rng: Random, cuts: Sequence[Cut] = ()) -> None:
         self.cuts = cuts
+        self.doubles: Sequence[Cut] = ()
+        self.swaps: Sequence[Cut] = ()
+        self._waiting = b""
         self._rng = rng
         self._latency_s = config.latency_s
         self._jitter_s = config.latency_jitter_s
@@ -62,7 +66,14 @@ class Channel:
             if t_s < end_s and arrival_s >= start_s:
                 return None
         self._last_s = arrival_s
-        return arrival_s, self._corrupted(data) if self._corruption else data
+        data = self._corrupted(data) if self._corruption else data
+        if _within(self.doubles, t_s):
+            data += data
+        if _within(self.swaps, t_s) and not self._waiting:
+            self._waiting = data
+            return None
+        data, self._waiting = data + self._waiting, b""
+        return arrival_s, data
 
     def _is_lost(self) -> bool:
         """Step the chain by one chunk; its share of bad states is the loss ratio."""
@@ -84,3 +95,7 @@ class Channel:
             at += 1 + self._draw_clean_bytes()
         self._clean_bytes = at - len(out)
         return bytes(out)
+
+
+def _within(spans: Sequence[Cut], t_s: float) -> bool:
+    return any(start_s <= t_s < end_s for start_s, end_s in spans)

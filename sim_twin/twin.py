@@ -8,26 +8,24 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from random import Random
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from hil.config.robot import BUILT_IN_PLANT
 from hil.control.vehicles.vehicle import make_vehicle
 from hil.core.errors import BadInput, RigFault
 from hil.core.rig import PORT_BYTES, Frame, LineBacklog, Truth
 from hil.core.types import Pose
+from sim_twin.camera_faults import FaultyMaker, FrameMaker, covered_front
 from sim_twin.camera_timing import Exposure, Shutter, Span
 from sim_twin.drawn_poses import DrawnPoses, PoseTuple, load_localiser_error
+from sim_twin.host_faults import HostFaults
 from sim_twin.link_model import BITS_PER_BYTE, Channel, Serialiser
 from sim_twin.outside_plant import PERIOD_US, OutsidePlant
 from sim_twin.setup import make_kernel
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from hil.config.camera import CameraConfig
     from hil.config.events import Disturbance, Fault
     from hil.config.link import LinkConfig
@@ -41,13 +39,6 @@ HOST_START_S = 1000.0
 POSES_PER_EXPOSURE = 5
 # And over all rows of a rolling shutter: 15 ms more at 30 us a row.
 POSES_PER_READOUT = 17
-
-
-class FrameMaker(Protocol):
-    """Draws frames; see `sim_twin.camera_sim.RenderedCamera`."""
-
-    def make(self, index: int, poses: Sequence[PoseTuple]) -> NDArray[np.uint8]:
-        """Return the image of frame `index`; no poses: the robot is not to be seen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +79,7 @@ class TwinStream:
 
     def write(self, data: bytes) -> None:
         """Send the bytes towards the board; raises RigFault when the port is full."""
-        now_s = self._twin.now_s()
+        now_s = self._twin.world_s()
         try:
             self._backlog.write(now_s, len(data))
         except RigFault as error:
@@ -98,7 +89,7 @@ class TwinStream:
 
     def room_bytes(self) -> int:
         """Return how many bytes `write` takes now."""
-        waiting = self._backlog.waiting_bytes(self._twin.now_s())
+        waiting = self._backlog.waiting_bytes(self._twin.world_s())
         return max(PORT_BYTES - math.ceil(waiting), 0)
 
     def discard_unsent(self) -> None:
@@ -133,6 +124,8 @@ class Twin:
         self._setup = setup
         self._vehicle = make_vehicle(setup.robot)
         self._maker = maker
+        self._pictures = FaultyMaker(maker, setup.faults, lambda: _covered_maker(setup))
+        self._host = HostFaults(setup.faults)
         self._kernel = make_kernel(
             setup.robot, setup.link.baud, rng("kernel"), setup.disturbances, setup.faults, board
         )
@@ -171,15 +164,29 @@ class Twin:
 
     def now_s(self) -> float:
         """Return the virtual host clock."""
+        return self._now_s + self._host.step_s(self._now_s)
+
+    def world_s(self) -> float:
+        """Return the time of everything but the host, whose clock may have stepped."""
         return self._now_s
 
     def begin(self, t_start_s: float) -> None:
         """Let timed disturbances and faults count from `t_start_s`."""
+        t_start_s -= self._host.step_s(self._now_s)
         self._kernel.begin(_kernel_us(t_start_s))
         self._set_spans(t_start_s)
 
     def wait(self, until_s: float) -> None:
-        """Move to `until_s`, or to the next arrival of bytes or of a frame before it."""
+        """Move to `until_s`, or to the next arrival of bytes or of a frame before it.
+
+        Farther, where the host's process is kept from running then.
+        """
+        self._move(self._host.world_s(until_s, self._now_s))
+        runs_s = self._host.runs_at_s(self._now_s)
+        while self._now_s < runs_s:
+            self._move(runs_s)
+
+    def _move(self, until_s: float) -> None:
         arrived = False
         while not arrived:
             frame_s = self._next_frame.arrival_s if self._next_frame else math.inf
@@ -203,15 +210,26 @@ class Twin:
             measured = self._drawn.measure(poses[0] if poses else None)
             self._last_frame = Frame(exposure.index, exposure.t_cam_s, None, measured)
         else:
-            image = self._maker.make(exposure.index, poses)
+            image = self._pictures.make(exposure.start_s, exposure.index, poses)
             self._last_frame = Frame(exposure.index, exposure.t_cam_s, image)
-        return self._last_frame
+        step_s = sum(
+            size_s
+            for size_s, (start_s, end_s) in self._stamp_steps
+            if start_s <= exposure.start_s < end_s
+        )
+        if not step_s:
+            return self._last_frame
+        return replace(self._last_frame, t_cam_s=exposure.t_cam_s + step_s)
 
     def truth(self) -> Truth:
         """Return the true state now."""
         state = self._kernel.state()
         pose = Pose(*self._pose_at(self._now_s))
         return Truth(pose, state[3], state[5], self._vehicle.flat_output(pose))
+
+    def pose_at(self, t_s: float) -> Pose:
+        """Return the true pose at a time of the last four seconds of `world_s`."""
+        return Pose(*self._pose_at(t_s))
 
     def close(self) -> None:
         """End the program that works out the robot's motion, where there is one."""
@@ -229,7 +247,17 @@ class Twin:
         self._stalls = spans("camera_stall")
         self._occlusions = spans("camera_occluded")
         self._repeats = spans("camera_repeated")
-        self._down.cuts = self._up.cuts = spans("link_cut")
+        self._stamp_steps = [
+            (fault.step_s, _span(fault, t_begin_s))
+            for fault in self._setup.faults
+            if fault.kind == "camera_clock_step"
+        ]
+        both = spans("link_cut")
+        self._down.cuts, self._up.cuts = both + spans("link_down_cut"), both + spans("link_up_cut")
+        self._down.doubles = self._up.doubles = spans("link_duplicated")
+        self._down.swaps = self._up.swaps = spans("link_reordered")
+        self._pictures.begin(lambda fault: _span(fault, t_begin_s))
+        self._host.begin(lambda fault: _span(fault, t_begin_s))
 
     def _advance(self, target_s: float) -> bool:
         """Run towards `target_s`; False when the board has sent bytes on the way."""
@@ -279,6 +307,12 @@ class Twin:
         count = POSES_PER_EXPOSURE if rows_s == 0.0 else POSES_PER_READOUT
         step_s = (exposure.end_s - exposure.start_s + 2.0 * rows_s) / (count - 1)
         return tuple(self._pose_at(exposure.start_s - rows_s + i * step_s) for i in range(count))
+
+
+def _covered_maker(setup: TwinSetup) -> FrameMaker:
+    from sim_twin.camera_sim import RenderedCamera  # noqa: PLC0415 - only where pictures are drawn
+
+    return RenderedCamera(covered_front(setup.camera), setup.seed)
 
 
 def _kernel_us(t_s: float) -> int:

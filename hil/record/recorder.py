@@ -186,8 +186,11 @@ class Recorder:
         except RecordFault:
             pass
         except Exception as error:
-            self._give_up(f"the record could not be finished: {error}")
-            raise
+            with suppress(RecordFault):  # what is not found any more shows in many ways
+                self._keeping.check(self.path / layout.MANIFEST)
+            if self._keeping.fault is None:
+                self._give_up(f"the record could not be finished: {error}")
+                raise
         assert self._keeping.fault is not None
         before = (
             f"{detail}; "

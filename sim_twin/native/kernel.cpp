@@ -24,12 +24,14 @@ void Encoder::reset(double angle_rad) {
   pins_ = kGray[count_ & 3];
 }
 
-// A dead channel stays at the level its pin has now; swapped wires exchange the pins.
+// A dead channel stays at the level its pin has now; swapped wires exchange the pins; a disturbance of
+// the wires inverts both.
 std::uint8_t Encoder::level(const FaultState::Side& fault) const {
   std::uint8_t ab = kGray[count_ & 3];
   if (fault.swapped) ab = static_cast<std::uint8_t>(((ab & 1) << 1) | (ab >> 1));
   if (fault.dead_a) ab = static_cast<std::uint8_t>((ab & 0b01) | (pins_ & 0b10));
   if (fault.dead_b) ab = static_cast<std::uint8_t>((ab & 0b10) | (pins_ & 0b01));
+  if (fault.glitch) ab ^= 0b11;
   return ab;
 }
 
@@ -65,6 +67,7 @@ Kernel::Kernel(const PlantParams& params, const KernelOptions& options,
 void Kernel::reset(double x_m, double y_m, double theta_rad) {
   plant_.reset(x_m, y_m, theta_rad);
   for (Encoder& encoder : encoders_) encoder.reset(0.0);
+  slipped_rad_ = {};
   time_us_ = 0;
   begin_us_ = kNever_us;
   outside_from_us_ = outside_until_us_ = 0;
@@ -175,8 +178,9 @@ void Kernel::step() {
     follow_reset_line();
   }
   set_drive();
-  integrate();
   const StateVector& x = plant_.state();
+  const double wheel_rad[2] = {x[kWheelL], x[kWheelR]};
+  integrate();
   // Before the encoders, which would count every turn of a wheel that has run away; NaN fails too.
   if (!(std::fabs(x[kOmegaL]) + std::fabs(x[kOmegaR]) < kRunaway_rad_s)) {
     throw std::runtime_error("the simulated robot's state diverges");
@@ -184,7 +188,10 @@ void Kernel::step() {
   edges_.clear();
   for (int side = 0; side < 2; ++side) {
     const int port = fault_.encoders_exchanged ? 1 - side : side;
-    encoders_[side].move(x[kWheelL + side], t0_us, h_us, fault_.side[side], port, edges_);
+    // The encoder sits on the motor, which turns on where the gear slips.
+    const double moved_rad = x[kWheelL + side] - wheel_rad[side];
+    slipped_rad_[side] += moved_rad * (1.0 / fault_.side[side].grip - 1.0);
+    encoders_[side].move(x[kWheelL + side] + slipped_rad_[side], t0_us, h_us, fault_.side[side], port, edges_);
   }
   std::stable_sort(edges_.begin(), edges_.end(),
                    [](const PinEdge& a, const PinEdge& b) { return a.t_us < b.t_us; });

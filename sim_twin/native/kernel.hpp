@@ -104,6 +104,7 @@ class Kernel {
   FaultState fault_;
   Drive drive_;
   std::array<Encoder, 2> encoders_;
+  std::array<double, 2> slipped_rad_{};  // what the motors have turned more than their wheels
   std::vector<PinEdge> edges_;
   std::array<PoseSample, kPoses> poses_{};
   std::int64_t pose_count_ = 0;

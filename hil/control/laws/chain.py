@@ -27,6 +27,7 @@ class ChainState(NamedTuple):
     sin: float
     eta1: float
     w: float
+    limited: bool = False  # a side of the robot stands at its motor's limit
 
 
 class ChainCommand(NamedTuple):
@@ -79,8 +80,13 @@ class Chain:
         self._eta1_ref = 0.0
         self._w_ref = 0.0
 
-    def reset(self, estimate: Estimate, towards: Vec2) -> None:
-        """Start from the estimated speeds; at standstill zeta starts along `towards` (world)."""
+    def reset(
+        self, estimate: Estimate, towards: Vec2, zeta_start_m_s2: float | None = None
+    ) -> None:
+        """Start from the estimated speeds; at standstill zeta starts along `towards` (world).
+
+        It starts at `zeta_start_m_s2`, or at what the limits say where that is None.
+        """
         limits = self._limits
         theta = estimate.pose.theta_rad
         self._eta1_ref = clip(estimate.eta1_m_s, limits.eta1_max_m_s)
@@ -88,7 +94,8 @@ class Chain:
         self.zeta = 0.0
         if abs(estimate.eta1_m_s) < limits.lambda_m_s:
             ahead = math.cos(theta) * towards[0] + math.sin(theta) * towards[1]
-            self.zeta = math.copysign(limits.zeta_start_m_s2, ahead)
+            start = limits.zeta_start_m_s2 if zeta_start_m_s2 is None else zeta_start_m_s2
+            self.zeta = math.copysign(start, ahead)
 
     def state(self, estimate: Estimate) -> ChainState:
         """Return z2, z3 from the estimate; z3 from zeta unless the estimator observes it."""
@@ -99,7 +106,7 @@ class Chain:
         if z3 is None:
             lateral = eta1 * w
             z3 = (cos * self.zeta - sin * lateral, sin * self.zeta + cos * lateral)
-        return ChainState(estimate.z2_m_s, z3, cos, sin, eta1, w)
+        return ChainState(estimate.z2_m_s, z3, cos, sin, eta1, w, estimate.sides_at_limit != (0, 0))
 
     def command(self, jerk: Vec2, state: ChainState, dt_s: float) -> ChainCommand:
         """Invert the wanted jerk (world) and integrate it over dt_s to bounded set-points."""
@@ -129,6 +136,7 @@ class Chain:
             or zeta_next != zeta_free
             or eta1 != eta1_free
             or w != w_free
+            or state.limited
         )
         # At the speed limit the robot does not accelerate: zeta says so, else z3 is a fiction.
         self.zeta = 0.0 if eta1 != eta1_free else zeta_next
@@ -142,6 +150,19 @@ class Chain:
             clip(w + lead * (w_dot if w == w_free else 0.0), limits.theta_dot_max_rad_s),
             saturated,
         )
+
+
+def executed_jerk(state: ChainState, out: ChainCommand, zeta_next: float, dt_s: float) -> Vec2:
+    """Return the jerk (world) that a command makes of the model once the limits have had their say.
+
+    `zeta_next` is the chain's zeta after it: what v1 was worth.
+    """
+    along = (zeta_next - out.zeta) / dt_s - state.eta1 * state.w * state.w
+    across = 2.0 * out.zeta * state.w + state.eta1 * out.w_dot
+    return (
+        state.cos * along - state.sin * across,
+        state.sin * along + state.cos * across,
+    )
 
 
 def restrict(value: Vec2, rate: Vec2, accel: Vec2, limit: float | None) -> tuple[Vec2, Vec2, Vec2]:
