@@ -231,6 +231,7 @@ class Rig:
         down: Channel,
         up: Channel,
         shutter: Shutter,
+        readout_s: float = 0.0,
     ) -> None: ...
     def set_spans(self, stalls: Sequence[_Span], hidden: Sequence[_Span]) -> None:
         """Set when the camera stalls (in order of start) and the robot is hidden."""

@@ -37,6 +37,8 @@ HOST_START_S = 1000.0
 # Poses handed to the renderer over one exposure, an odd number so that one is at its middle:
 # 0.75 mm apart at 0.5 m/s and 6 ms.
 POSES_PER_EXPOSURE = 5
+# And over all rows of a rolling shutter: 15 ms more at 30 us a row.
+POSES_PER_READOUT = 17
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +114,7 @@ class Twin:
             down=Channel(setup.link, rng("link down")),
             up=Channel(setup.link, rng("link up")),
             shutter=Shutter(setup.camera, rng("shutter"), HOST_START_S),
+            readout_s=setup.camera.line_time_s * (setup.camera.height_px - 1),
         )
         self.stream = TwinStream(self._rig, setup.link.baud)
         self._drawn = DrawnPoses(load_localiser_error(), setup.camera, rng("localiser"))
@@ -162,7 +165,9 @@ class Twin:
 
     def _move(self, until_s: float) -> None:
         # Where no image is drawn a frame is the one pose at the middle of its exposure.
-        poses = 1 if self._maker is None else POSES_PER_EXPOSURE
+        rolling = self._setup.camera.line_time_s > 0.0
+        drawn = POSES_PER_READOUT if rolling else POSES_PER_EXPOSURE
+        poses = 1 if self._maker is None else drawn
         try:
             if self._outside is None:
                 self._rig.wait(until_s, poses)

@@ -31,10 +31,17 @@ _SPEED = ("speed", "parts", "batch", "law", "campaign", "report")
 @click.option("--against", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
               help="speed to report: compare with what --json printed at another revision: ratio of "
               "the medians with its 95 % interval.")  # fmt: skip
+@click.option("--page", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+              help="vision: write an HTML page with the worst frames there.")  # fmt: skip
+@click.option("--frames", type=click.IntRange(2, 10_000), default=40, show_default=True,
+              help="vision: frames of each condition that marks, tags and peers are shown.")  # fmt: skip
+@click.option("--empty", type=click.IntRange(1, 1_000_000), default=10_000, show_default=True,
+              help="vision: frames without the robot, full of things like it.")  # fmt: skip
 @json_option
 def command(
-    what: str, runs: int, candidates: int | None, against: Path | None, as_json: bool
-) -> None:
+    what: str, runs: int, candidates: int | None, against: Path | None, page: Path | None,
+    frames: int, empty: int, as_json: bool,
+) -> None:  # fmt: skip
     """Measure the speed of the harness, or compare the wheel laws of the board.
 
     \b
@@ -45,9 +52,14 @@ def command(
     campaign  runs a second of a campaign on all cores
     report    a campaign's answers and page
     wheels    both wheel laws at step, ramp, crawl, turn, load, friction, battery sag
-    vision    the colour marks on rendered sequences of known truth; some minutes
+    vision    the colour marks on rendered sequences with known truth, and beside cv2.aruco,
+              AprilTag and a plain threshold; half an hour
     firmware  what the sketch costs the Mega 2560: cycles by part, load, memory
     """  # noqa: D301 - \b is click's mark for a verbatim paragraph
+    if what != "vision" and page is not None:
+        raise click.UsageError(f"--page: {what} has no frames to show; only vision has")
+    if page is not None and not page.absolute().parent.is_dir():
+        raise click.UsageError(f"--page {page}: there is no folder {page.absolute().parent}")
     if what in _SPEED and candidates is not None:
         raise click.UsageError("--tune: the wheels have gains, the speed figures have none")
     if what not in _SPEED and against is not None:
@@ -57,25 +69,35 @@ def command(
     elif what == "wheels":
         _compare_wheels(runs, as_json)
     elif what == "vision":
-        _measure_vision(as_json)
+        _measure_vision(frames, empty, page, as_json)
     elif what == "firmware":
         _measure_firmware(as_json)
     else:
         _measure_speed(what, runs, against, as_json)
 
 
-def _measure_vision(as_json: bool) -> None:
-    from hil.tools import bench_vision
+def _measure_vision(frames: int, without: int, page: Path | None, as_json: bool) -> None:
+    from dataclasses import asdict
+
+    from hil.core.files import replace_file
+    from hil.tools import bench_peers, bench_vision
 
     def progress(text: str) -> None:
         click.echo(text, err=True)
 
     rows = bench_vision.table(100, progress)
-    empty = bench_vision.empty_scenes(10_000, progress)
+    empty = bench_vision.empty_scenes(without, progress)
+    shown = list(bench_peers.lines(frames, progress))
+    peers = [line for lines, _ in shown for line in lines]
+    if page is not None:
+        text = bench_peers.as_page(peers, [worst for _, worst in shown])
+        replace_file(page, text.encode("utf-8"))
     if as_json:
-        print_json(bench_vision.as_document(rows, empty))
+        document = bench_vision.as_document(rows, empty)
+        print_json({**document, "peers": [asdict(line) for line in peers]})
         return
     click.echo(bench_vision.as_markdown(rows, empty))
+    click.echo("\n" + bench_peers.as_markdown(peers))
 
 
 def _measure_firmware(as_json: bool) -> None:

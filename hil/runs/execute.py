@@ -43,6 +43,7 @@ from hil.runs.watched import WatchedSink
 from hil.wire.identity import board_hashes
 from hil.wire.link import BoardLink
 from vision.localisers.making import make_localiser
+from vision.spread import spread
 
 if TYPE_CHECKING:
     from hil.config.camera import CameraConfig
@@ -298,7 +299,7 @@ def _localiser_of(spec: RunSpec) -> Localiser:
     """Return the localiser of a run; where poses are drawn its projections need not be worked out."""
     if is_simulated(spec.target) and spec.camera == "pose":
         return _WhenAsked(spec.scenario.camera)
-    return make_localiser(spec.scenario.camera)
+    return spread(make_localiser(spec.scenario.camera))
 
 
 def make_manifest(spec: RunSpec) -> Manifest:

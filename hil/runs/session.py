@@ -21,6 +21,7 @@ from hil.runs.supervision import Disagreement, Supervisor
 from hil.runs.wheel_limits import WheelLimits
 from hil.wire import handshake
 from hil.wire.refusal import refused_set_point
+from vision.rolling import unrolled
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
@@ -334,6 +335,8 @@ class Session:
         A frame whose stamp the camera's clock refuses is recorded and not looked at.
         """
         parts, clock = self._parts, self._parts.camera_clock
+        if frame.note:
+            self._note("camera", frame.note)
         stamped = clock.arrival(frame.t_cam_s, now_s)
         exposure_s = clock.to_host_s(frame.t_cam_s)
         if clock.restarts != self._camera_restarts:
@@ -375,11 +378,10 @@ class Session:
             return frame.pose
         assert frame.image is not None
         before = self._parts.estimator.estimate_at(exposure_s)
-        return self._parts.localiser.locate(
-            frame.image,
-            before.pose if before is not None else None,
-            self._scenario.camera.search_radius_m,
-        )
+        camera = self._scenario.camera
+        predicted = before.pose if before is not None else None
+        seen = self._parts.localiser.locate(frame.image, predicted, camera.search_radius_m)
+        return unrolled(seen, camera, before)
 
     def _estimate(self, t_effect_s: float) -> Estimate:
         """Return the state at the actuation time, inside the fence; else RigFault."""

@@ -117,9 +117,11 @@ std::vector<PoseSample> Rig::poses_over(const Exposure& exposure, int poses) con
     if (start_s <= exposure.start_s && exposure.start_s < end_s) return {};
   }
   if (poses == 1) return {pose_at(0.5 * (exposure.start_s + exposure.end_s))};
-  const double step_s = (exposure.end_s - exposure.start_s) / (poses - 1);
+  // A rolling shutter's first and last rows are exposed earlier and later than the middle one.
+  const double rows_s = 0.5 * options_.readout_s;
+  const double step_s = (exposure.end_s - exposure.start_s + 2.0 * rows_s) / (poses - 1);
   std::vector<PoseSample> out;
-  for (int i = 0; i < poses; ++i) out.push_back(pose_at(exposure.start_s + i * step_s));
+  for (int i = 0; i < poses; ++i) out.push_back(pose_at(exposure.start_s - rows_s + i * step_s));
   return out;
 }
 

@@ -17,6 +17,7 @@ namespace twin {
 struct RigOptions {
   double start_s = 0.0;
   int baud = 57600;
+  double readout_s = 0.0;  // of a rolling shutter: from the first row to the last
 };
 
 // A frame that has arrived: the robot's poses over its exposure, none while it is hidden.

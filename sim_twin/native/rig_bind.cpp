@@ -106,7 +106,7 @@ void bind_rig(nb::module_& m) {
   bind_parts(m);
   using twin::Rig;
   nb::class_<Rig>(m, "Rig")
-      .def("__init__", [](Rig* self, twin::Kernel& kernel, double start_s, int baud, const twin::Channel& down, const twin::Channel& up, const twin::Shutter& shutter) { new (self) Rig(kernel, {start_s, baud}, down, up, shutter); }, nb::keep_alive<1, 2>(), "kernel"_a, "start_s"_a, "baud"_a, "down"_a, "up"_a, "shutter"_a)
+      .def("__init__", [](Rig* self, twin::Kernel& kernel, double start_s, int baud, const twin::Channel& down, const twin::Channel& up, const twin::Shutter& shutter, double readout_s) { new (self) Rig(kernel, {start_s, baud, readout_s}, down, up, shutter); }, nb::keep_alive<1, 2>(), "kernel"_a, "start_s"_a, "baud"_a, "down"_a, "up"_a, "shutter"_a, "readout_s"_a = 0.0)
       .def("set_spans", &Rig::set_spans, "stalls"_a, "hidden"_a)
       .def_prop_ro("down", &Rig::down, nb::rv_policy::reference_internal)
       .def_prop_ro("up", &Rig::up, nb::rv_policy::reference_internal)
