@@ -28,7 +28,7 @@ from hil.core.text import visible
 
 if TYPE_CHECKING:
     from hil.record.reader import RunRecord
-    from hil.runs.session import Publish
+    from hil.runs.parts import Publish
 
 
 @click.command("run")

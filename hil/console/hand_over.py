@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hil.config.scenario import Scenario
-    from hil.runs.session import Parts
+    from hil.runs.parts import Parts
 
 # Kinds: JSON, rows of samples (float64), a camera picture (JPEG) behind its frame's row.
 JSON, ROWS, PICTURE = b"J", b"R", b"I"

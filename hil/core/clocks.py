@@ -384,3 +384,10 @@ class CameraClock:
         insort(self._sorted_s, gap_s)
         if len(self._gaps_s) > self._window:
             del self._sorted_s[bisect_left(self._sorted_s, self._gaps_s.popleft())]
+
+
+def odd_stamp(ahead_s: float) -> str:
+    """Return why a frame is not looked at whose exposure would lie `ahead_s` after its arrival."""
+    if ahead_s > 0.0:
+        return f"stamped {ahead_s:.3f} s later than it came"
+    return "stamped earlier than a frame before it, or not at all"

@@ -26,7 +26,8 @@ from hil.record.tlog import LoggedFrame
 from hil.replays.divergence import Channel, compare_columns, compare_link
 from hil.rigs.replay import HAPPENED, open_replay
 from hil.runs.execute import RunSpec, board_parameters, make_parts, trace_terms
-from hil.runs.session import Ending, Session
+from hil.runs.parts import Ending
+from hil.runs.session import Session
 from hil.wire.identity import board_hashes
 
 if TYPE_CHECKING:

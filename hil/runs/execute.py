@@ -38,7 +38,8 @@ from hil.rigs.opening import REPLAY, is_simulated, open_rig
 from hil.runs.interruption import CtrlC
 from hil.runs.law_guard import GuardedLaw
 from hil.runs.outside import fault_of
-from hil.runs.session import Ending, Parts, Progress, Publish, Session
+from hil.runs.parts import Ending, Parts, Progress, Publish
+from hil.runs.session import Session
 from hil.runs.watched import WatchedSink
 from hil.wire.identity import board_hashes
 from hil.wire.link import BoardLink

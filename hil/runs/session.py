@@ -9,13 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
+from hil.core.clocks import odd_stamp
 from hil.core.errors import RecordFault, RigFault
 from hil.core.registry import in_one_line
 from hil.core.types import PoseMeasurement
 from hil.record.tick_rows import sample_row
+from hil.runs.parts import Ending, Parts, Progress, Publish, Situation
 from hil.runs.plausibility import DIAGNOSIS, Plausibility
 from hil.runs.supervision import Disagreement, Supervisor
 from hil.runs.wheel_limits import WheelLimits
@@ -25,15 +27,9 @@ from vision.rolling import unrolled
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
-    from hil.control.references import Reference
-    from hil.control.vehicles.vehicle import Vehicle
-    from hil.core.clocks import CameraClock
-    from hil.core.rig import Frame, Rig
-    from hil.core.types import Estimate, Estimator, OuterCommand, OuterLaw, ReferenceState
-    from hil.record.memory import RunSink
-    from hil.record.timeline import Timeline
-    from hil.wire.link import BoardLink, WheelReport
-    from vision.tracker import Localiser
+    from hil.core.rig import Frame
+    from hil.core.types import Estimate, OuterCommand
+    from hil.wire.link import WheelReport
 
 # Poses and time exchanges wanted before the start; both ties are then good to a few ms.
 _POSES_WANTED = 15
@@ -45,44 +41,6 @@ _STOP_TIMEOUT_S = 2.0
 _LATE_RATIO = 0.5
 # Share by which the measured delay to the board follows a new round trip.
 _UPLINK_GAIN = 0.05
-
-Progress = Callable[[float], None]
-# Takes host time, state of the robot, and whether it is armed, once a tick.
-Publish = Callable[[float, "Estimate", bool], None]
-
-
-@dataclass(frozen=True, slots=True)
-class Parts:
-    """What a session is made of."""
-
-    rig: Rig
-    link: BoardLink
-    camera_clock: CameraClock
-    localiser: Localiser
-    estimator: Estimator
-    law: OuterLaw
-    reference: Reference
-    vehicle: Vehicle
-    recorder: RunSink
-    timeline: Timeline
-    own_terms: tuple[str, ...] = ()  # of the law's trace, kept in columns of their own
-
-
-@dataclass(frozen=True, slots=True)
-class Ending:
-    """How the controlled part ended; `detail` names the cause of a fault."""
-
-    outcome: Literal["complete", "fault", "interrupted"]
-    detail: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Situation:
-    """What the outer law is asked about at one tick; `t_s` counts from the first one."""
-
-    t_s: float
-    reference: ReferenceState
-    estimate: Estimate
 
 
 class Session:
@@ -343,7 +301,7 @@ class Session:
             self._camera_restarts = clock.restarts
             self._note("camera", f"its clock has stepped by {clock.step_s:+.3f} s; tied anew")
         if not stamped:
-            measurement = PoseMeasurement(None, 0.0, _odd_stamp(exposure_s - now_s))
+            measurement = PoseMeasurement(None, 0.0, odd_stamp(exposure_s - now_s))
         else:
             exposure_s = min(exposure_s, now_s)  # jitter aside, no frame is exposed after it came
             measurement = self._measured(frame, exposure_s)
@@ -438,10 +396,3 @@ class Session:
             )
         )
         self._seen = self._accepted = False
-
-
-def _odd_stamp(ahead_s: float) -> str:
-    """Return why a frame is not looked at whose exposure would lie `ahead_s` after its arrival."""
-    if ahead_s > 0.0:
-        return f"stamped {ahead_s:.3f} s later than it came"
-    return "stamped earlier than a frame before it, or not at all"

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hil.record.memory import RunSink
-    from hil.runs.session import Parts
+    from hil.runs.parts import Parts
 
 
 class Watch(Protocol):

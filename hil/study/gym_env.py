@@ -20,7 +20,8 @@ from hil.record.memory import MemoryRecorder
 from hil.record.schema import SAMPLE_NAMES
 from hil.rigs.opening import is_simulated, open_rig, simulated_targets
 from hil.runs.execute import RunSpec, board_parameters, link_stats, make_manifest, make_parts
-from hil.runs.session import Ending, Session
+from hil.runs.parts import Ending
+from hil.runs.session import Session
 from hil.study.tune import COST_WEIGHTS, run_cost
 from hil.wire.identity import board_hashes
 
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from hil.core.rig import Rig
     from hil.core.types import Estimate, ReferenceState
     from hil.record.reader import RunRecord
-    from hil.runs.session import Parts, Situation
+    from hil.runs.parts import Parts, Situation
 
     Vector = NDArray[np.float64]
 

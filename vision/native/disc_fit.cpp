@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "symmetric.hpp"
+
 namespace vision {
 namespace {
 
@@ -33,11 +35,7 @@ constexpr double kNoiseSlope = 0.4;
 constexpr double kFreeRatio = 0.0008;  // of the radius
 constexpr double kFreePx = 0.004;
 
-using Matrix = std::array<Move, 3>;
-
 int count(const Mask& keep) { return static_cast<int>(std::count(keep.begin(), keep.end(), true)); }
-
-double dot3(const Move& a, const Move& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 Matrix normal(const std::array<Move, kRays>& rows, const Mask& keep) {
   Matrix n = {};
@@ -50,21 +48,6 @@ Matrix normal(const std::array<Move, kRays>& rows, const Mask& keep) {
   }
   n[2][2] += kRadiusPull;
   return n;
-}
-
-// The inverse of a symmetric matrix; none where there is none.
-std::optional<Matrix> inverse(const Matrix& m) {
-  const double a = m[1][1] * m[2][2] - m[1][2] * m[1][2];
-  const double b = m[0][2] * m[1][2] - m[0][1] * m[2][2];
-  const double c = m[0][1] * m[1][2] - m[0][2] * m[1][1];
-  const double det = m[0][0] * a + m[0][1] * b + m[0][2] * c;
-  if (!(det > 0.0)) {
-    return std::nullopt;
-  }
-  const double d = m[0][0] * m[2][2] - m[0][2] * m[0][2];
-  const double e = m[0][1] * m[0][2] - m[0][0] * m[1][2];
-  const double f = m[0][0] * m[1][1] - m[0][1] * m[0][1];
-  return Matrix{{{a / det, b / det, c / det}, {b / det, d / det, e / det}, {c / det, e / det, f / det}}};
 }
 
 // Usable rays whose levels hold nothing of a cover's: levels are means over neighbouring rays, and two

@@ -8,10 +8,10 @@
 #include "camera.hpp"
 #include "picture.hpp"
 #include "rims.hpp"
+#include "symmetric.hpp"
 
 namespace vision {
 
-using Move = std::array<double, 3>;  // du, dv in px, growth of the radius
 
 // One fitted disc. (u, v) is the image of its centre, `growth` its radius over the known one less 1,
 // `share` the part of its rim that was seen, `residual_px` the RMS of those edges, the covariance

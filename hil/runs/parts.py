@@ -1,0 +1,56 @@
+"""What a session is made of, what it tells on the way, and how it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from hil.control.references import Reference
+    from hil.control.vehicles.vehicle import Vehicle
+    from hil.core.clocks import CameraClock
+    from hil.core.rig import Rig
+    from hil.core.types import Estimate, Estimator, OuterLaw, ReferenceState
+    from hil.record.memory import RunSink
+    from hil.record.timeline import Timeline
+    from hil.wire.link import BoardLink
+    from vision.tracker import Localiser
+
+Progress = Callable[[float], None]
+# Takes host time, state of the robot, and whether it is armed, once a tick.
+Publish = Callable[[float, "Estimate", bool], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What a session is made of."""
+
+    rig: Rig
+    link: BoardLink
+    camera_clock: CameraClock
+    localiser: Localiser
+    estimator: Estimator
+    law: OuterLaw
+    reference: Reference
+    vehicle: Vehicle
+    recorder: RunSink
+    timeline: Timeline
+    own_terms: tuple[str, ...] = ()  # of the law's trace, kept in columns of their own
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How the controlled part ended; `detail` names the cause of a fault."""
+
+    outcome: Literal["complete", "fault", "interrupted"]
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What the outer law is asked about at one tick; `t_s` counts from the first one."""
+
+    t_s: float
+    reference: ReferenceState
+    estimate: Estimate
