@@ -53,7 +53,7 @@ KINDS = (
         "Scenario or lab of skid-steer-hil",
         Scenario,
         ("scenarios", "labs"),
-        ("RobotConfig", "CameraConfig"),
+        ("RobotConfig", "CameraConfig", "WaypointReference", "StopsReference"),
     ),
     FileKind("robot", "Robot of skid-steer-hil", RobotConfig, ("robots",)),
     FileKind("camera", "Camera of skid-steer-hil", CameraConfig),
