@@ -1,0 +1,225 @@
+"""What each part of a law is worth: the law with one part off against the whole, pair by pair.
+
+Every part is switched off in turn, in the same cells with the same seeds. The cells are those of a
+deck that no search has seen (docs/verdict.md).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from hil.analysis.multiple import discoveries
+from hil.analysis.stats import Paired, paired
+from hil.control.laws.hold import HoldAtGoal
+from hil.control.laws.parts import (
+    WithoutFeedForward,
+    WithoutGamma,
+    WithoutKappa,
+    has_block,
+    replace_block,
+)
+from hil.core.errors import BadInput
+from hil.core.registries import OUTER_LAWS
+from hil.study.suite import Job, Make, Scores, Yardstick
+
+if TYPE_CHECKING:
+    from hil.config.gains import Gains
+    from hil.config.scenario import Scenario
+    from hil.core.registry import Entry
+
+# A gain at zero is the part off: part -> gain.
+_BY_GAIN = {"alpha": "alpha_m_s3", "psi": "sigma_m_s2", "integral": "ki_s4"}
+_BY_BLOCK: Mapping[str, Any] = {"kappa": WithoutKappa, "gamma": WithoutGamma}
+_BY_LIMIT: Mapping[str, Mapping[str, float | None]] = {
+    "restrictions": {"approach_speed_m_s": None, "approach_accel_m_s2": None},
+    "lead": {"lead_s": 0.0},
+    "hold": {"hold_enter_m": 0.0},
+}
+MEANING = {
+    "alpha": "gain of the sliding term at 0",
+    "psi": "averaged sub-gradient Psi at 0 (sigma = 0)",
+    "integral": "gain of the integral at 0",
+    "kappa": "kappa left out of the command",
+    "gamma": "gamma at 0: s does not start at 0",
+    "feed-forward": "derivatives of the reference taken as 0",
+    "restrictions": "no bound on what position and velocity error ask for",
+    "lead": "set-points without their lead",
+    "hold": "no rest at the goal",
+}
+SCORES = Scores._fields
+
+
+def parts_of(law: str) -> list[str]:
+    """Return the parts of a law that can be switched off; those of all laws last."""
+    entry = OUTER_LAWS.get(law)
+    fields = entry.settings.model_fields if entry.settings is not None else {}
+    own = [part for part, gain in _BY_GAIN.items() if gain in fields and _may_be_zero(entry, gain)]
+    blocks = list(_BY_BLOCK) if _stands_on_block(entry) else []
+    return [*own, *blocks, "feed-forward", *_BY_LIMIT]
+
+
+def _may_be_zero(entry: Entry, gain: str) -> bool:
+    assert entry.settings is not None
+    bounds = entry.settings.model_fields[gain].metadata
+    return not any(getattr(bound, "gt", None) is not None for bound in bounds)
+
+
+def _stands_on_block(entry: Entry) -> bool:
+    from hil.config.control import ControlConfig  # noqa: PLC0415 - a default set of gains is enough
+
+    control = ControlConfig()
+    gains = control.active_gains.of(entry)
+    try:
+        return has_block(entry.factory(gains, control.limits, 0.03))
+    except Exception:  # a law from outside may need anything: it has no block of ours
+        return False
+
+
+def run_without(
+    scenario: Scenario, outer: str, seed: int, without: str = ""
+) -> dict[str, float] | None:
+    """Return the figures of one run with a part of the law off; None where it ends early."""
+    from hil.runs.execute import RunSpec, execute_in_memory  # noqa: PLC0415
+    from hil.study.suite import run_folder  # noqa: PLC0415
+
+    if without and without not in parts_of(outer):
+        raise BadInput(
+            f"law {outer}: has no part {without!r} to switch off; it has {', '.join(parts_of(outer))}"
+        )
+    scenario = _changed(scenario, outer, without)
+    spec = RunSpec(
+        scenario=scenario,
+        target="twin",
+        camera="pose",
+        outer=outer,
+        inner="asg-ism",
+        seed=seed,
+        out=run_folder(),
+        command="hil ablate",
+    )
+    law = _law_without(scenario, outer, without)
+    record = execute_in_memory(spec, law=law)
+    return record.figures().values if record.manifest.outcome == "complete" else None
+
+
+def _changed(scenario: Scenario, outer: str, without: str) -> Scenario:
+    control = scenario.control
+    if without in _BY_LIMIT:
+        limits = control.limits.model_copy(update=dict(_BY_LIMIT[without]))
+        return scenario.model_copy(
+            update={"control": control.model_copy(update={"limits": limits})}
+        )
+    if without in _BY_GAIN:
+        name = control.gain_set
+        gains = control.active_gains.with_values(OUTER_LAWS.get(outer), {_BY_GAIN[without]: 0.0})
+        sets = control.gains.model_copy(update={name: gains})
+        return scenario.model_copy(update={"control": control.model_copy(update={"gains": sets})})
+    return scenario
+
+
+def _law_without(scenario: Scenario, outer: str, without: str) -> Any:
+    """Return the law with a part off, None where the scenario says it all."""
+    if without not in _BY_BLOCK and without != "feed-forward":
+        return None
+    control, entry = scenario.control, OUTER_LAWS.get(outer)
+    law = entry.factory(control.active_gains.of(entry), control.limits, scenario.robot.d0_m)
+    if without == "feed-forward":
+        law = WithoutFeedForward(law)
+    else:
+        replace_block(law, _BY_BLOCK[without])
+    return HoldAtGoal(law, control.limits) if entry.extra.get("hold", True) else law
+
+
+@dataclass(frozen=True, slots=True)
+class Worth:
+    """A part of a law: score without it minus score of the whole; above 0 the part helps.
+
+    `found` says of each score whether the difference stands when all of a table's are looked at
+    together (false discovery rate of 5 %).
+    """
+
+    law: str
+    part: str
+    differences: dict[str, Paired]
+    failed: int
+    found: dict[str, bool]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the row for a JSON document."""
+        return {
+            "law": self.law,
+            "part": self.part,
+            "meaning": MEANING.get(self.part, ""),
+            "failed_runs": self.failed,
+            "scores": {
+                name: result.to_json() | {"discovery": self.found[name]}
+                for name, result in self.differences.items()
+            },
+        }
+
+
+def ablate(
+    laws: Mapping[str, Gains | None],
+    cells: Sequence[str],
+    seeds: Sequence[int],
+    yardstick: Yardstick,
+    make: Make,
+    parts: Callable[[str], Sequence[str]] = parts_of,
+) -> list[Worth]:
+    """Return a row for each part of each law; runs are the same cells and seeds throughout."""
+    variants = [(law, part) for law in laws for part in ("", *parts(law))]
+    jobs = [
+        Job(law, laws[law], cell, seed, part)
+        for law, part in variants
+        for cell in cells
+        for seed in seeds
+    ]
+    figures = make(jobs)
+    each = len(cells) * len(seeds)
+    tapes = [(cell, seed) for cell in cells for seed in seeds]
+    scores: dict[tuple[str, str], list[Scores]] = {}
+    failed: dict[tuple[str, str], int] = {}
+    for number, variant in enumerate(variants):
+        rows = figures[number * each : (number + 1) * each]
+        scores[variant] = [
+            yardstick.scores(cell, row) for (cell, _), row in zip(tapes, rows, strict=True)
+        ]
+        failed[variant] = sum(not row for row in rows)
+    found = {
+        (law, part): {
+            name: _by_cell(scores[law, ""], scores[law, part], i, len(seeds))
+            for i, name in enumerate(SCORES)
+        }
+        for law, part in variants
+        if part
+    }
+    names = [(variant, name) for variant in found for name in SCORES]
+    stand = discoveries([_p_of(found[variant][name]) for variant, name in names])
+    told = dict(zip(names, stand, strict=True))
+    return [
+        Worth(
+            law,
+            part,
+            found[law, part],
+            failed[law, part],
+            {name: told[(law, part), name] for name in SCORES},
+        )
+        for law, part in found
+    ]
+
+
+def _by_cell(whole: Sequence[Scores], off: Sequence[Scores], score: int, seeds: int) -> Paired:
+    """Compare cell by cell, each the mean over its seeds: cells are what a task is drawn from."""
+
+    def means(rows: Sequence[Scores]) -> list[float]:
+        values = [row[score] for row in rows]
+        return [sum(values[i : i + seeds]) / seeds for i in range(0, len(values), seeds)]
+
+    return paired(means(whole), means(off))
+
+
+def _p_of(result: Paired) -> float:
+    return 1.0 if math.isnan(result.rank_p) else result.rank_p
