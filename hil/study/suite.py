@@ -143,9 +143,7 @@ class Yardstick:
 
 def together(scores: Sequence[Scores]) -> Scores:
     """Return the scores of several runs as one."""
-    accuracy, calm, effort = (
-        [one[i] for one in scores] for i in range(3)
-    )  # one column a score
+    accuracy, calm, effort = ([one[i] for one in scores] for i in range(3))  # one column a score
     count = len(scores)
     mean = sum(accuracy) / count
     return Scores(
