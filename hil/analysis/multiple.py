@@ -122,7 +122,7 @@ def cvar(values: Sequence[float], tail: float = TAIL) -> float:
     if known.size == 0:
         return math.nan
     weight = tail * known.size
-    whole = int(math.floor(weight + 1e-12))
+    whole = math.floor(weight + 1e-12)
     part = weight - whole
     total = float(known[:whole].sum()) + (part * float(known[whole]) if part > 1e-12 else 0.0)
     return total / weight
@@ -176,7 +176,7 @@ def difference_seen(sd: float, pairs: int, wanted: float = 0.8) -> float:
 FIRST_LOOK = 16
 _GROWTH = 1.5
 # The half width at a look must be below this share of what was asked. Without it, stopping at widths
-# that are small by chance lets intervals hold the mean less often than they say (measured, docs/statistics.md).
+# that are small by chance lets intervals hold the mean less often than they say (docs/statistics.md).
 STOP_SHARE = 0.94
 
 
@@ -198,7 +198,8 @@ def narrow_enough(differences: Sequence[float], half_width: float) -> bool:
     if values.size < min(FIRST_LOOK, len(differences)) or values.size < 6:
         return False
     ends = mean_interval(values)
-    return max(ends.high - values.mean(), values.mean() - ends.low) <= STOP_SHARE * half_width
+    mean = float(values.mean())
+    return max(ends.high - mean, mean - ends.low) <= STOP_SHARE * half_width
 
 
 def _finite(value: float) -> float | None:

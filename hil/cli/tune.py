@@ -64,9 +64,12 @@ def command(
     SCENARIO... are the tasks: built-in names, TOML files, or one deck; the three scenarios of the
     thesis when none is given. Each is run calm, pushed, late and, where it goes to a point, beside it.
 
-    The result is a gain set with its origin. It is judged at once on a held-out tape: the tasks with
-    seeds no candidate has seen, all laws under the same ones. Some ten minutes of two cores; a
-    search that is interrupted keeps its runs in FILE.search, and the same command goes on.
+    A deck with conditions (`suite`) is split: the search sees one half of its tasks and conditions, and is
+    judged on the other (docs/verdict.md). Without one, the result is judged on the same tasks with
+    seeds no candidate has seen, which says nothing of other tasks.
+
+    The result is a gain set with its origin, judged at once, all laws under the same seeds. Some ten
+    minutes of two cores; a search that is interrupted keeps its runs in FILE.search, and the same command goes on.
     """
     from hil.core.errors import BadInput
     from hil.study.campaign.results import program
@@ -118,7 +121,7 @@ def _searched(
     from hil.study.campaign.workers import Pool
     from hil.study.tuning_verdict import held_out_trials, judge, pairs_of, with_verdict
 
-    worker = tune.OnTarget("twin", camera, dict(tasks.scenarios) if tasks.own else {})
+    worker = tune.OnTarget("twin", camera, dict(tasks.known) if tasks.own else {})
     with stage_progress() as stage, Pool(worker, workers or os.cpu_count() or 1) as pool:
         steps: dict[str, Stage] = {}
 
@@ -140,7 +143,7 @@ def _searched(
         )
         pairs = pairs_of(laws)
         run = tuple(dict.fromkeys(law for pair in pairs for law in pair))
-        trials = held_out_trials(gains, repeats, tasks.names, run)
+        trials = held_out_trials(gains, repeats, tasks.judged, run)
         step = stage("held-out tape", len(trials))
         figures = journal.make(trials, pool.map, step.advance)
     verdicts = [judge(trials, figures, pair) for pair in pairs]

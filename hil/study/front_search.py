@@ -116,9 +116,7 @@ def search_front(
 
 def sampler(optuna: Any, seed: int) -> Any:
     """Return the sampler: of those compared the one with the largest fronts (docs/verdict.md)."""
-    return optuna.samplers.TPESampler(
-        seed=seed, multivariate=True, constant_liar=True, n_startup_trials=12
-    )
+    return optuna.samplers.NSGAIISampler(seed=seed, population_size=12)
 
 
 def _point_of(box: Box, values: Mapping[str, float]) -> list[float]:

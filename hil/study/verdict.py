@@ -1,14 +1,16 @@
 """The verdict on all laws: fronts searched on one half of a deck, judged on the other (docs/verdict.md).
 
-A search sees tasks, conditions and seeds that the verdict does not. Every law gets the same candidates, cells and
-seeds. All of it is repeated for several seeds of the search itself: what one seed says and another does not
-is no difference shown. What comes out is plain data; what it says is worked out from that alone (`hil.study.verdict_words`).
+A search sees tasks, conditions and seeds that the verdict does not. Every law gets the same
+candidates, cells and seeds. All of it is repeated for several seeds of the search itself: what one seed
+says and another does not is no difference shown. What comes out is plain data; what it says is worked
+out from that alone (`hil.study.verdict_words`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from hil.config.control import ControlConfig
@@ -147,7 +149,7 @@ def verdict_data(
             front = search_front(
                 law,
                 boxes[law],
-                lambda tried, law=law: _scores(law, tried, base, field, yard, make),
+                partial(_scores, law, base=base, field=field, yard=yard, make=make),
                 candidates=plan.candidates,
                 seed=seed,
             )
@@ -167,6 +169,7 @@ def verdict_data(
 def _scores(
     law: str,
     tried: Sequence[Mapping[str, float]],
+    *,
     base: Gains,
     field: Field,
     yard: Yardstick,

@@ -2,10 +2,11 @@
 
 Everything here is worked out from the data that `hil verdict` keeps, without a run.
 
-At a level of calm a law is worth what the points of its front, in the order of their calm on the unseen tasks, give
-at that calm: between two points their cells' accuracies are mixed by where the level lies. Of what is as
-calm as the level or calmer the one that was most accurate *in the search* is taken. Two laws are compared cell by cell on the logarithm
-of accuracy; tasks and conditions count as drawn (crossed), so an interval speaks of other tasks too.
+At a level of calm a law is worth what the points of its front, in the order of their calm on the unseen
+tasks, give at that calm: between two points their cells' accuracies are mixed by where the level lies. Of
+what is as calm as the level or calmer the one that was most accurate in the search is taken. Two laws are
+compared cell by cell on the logarithm of accuracy; tasks and conditions count as drawn (crossed), so an
+interval speaks of other tasks too.
 """
 
 from __future__ import annotations

@@ -56,7 +56,9 @@ def with_pymoo(law, box, scores_of, candidates, seed):
 def with_optuna(name):
     def search(law, box, scores_of, candidates, seed):
         chosen = {
-            "TPE": front_search.sampler,
+            "TPE": lambda o, s: o.samplers.TPESampler(
+                seed=s, multivariate=True, constant_liar=True, n_startup_trials=12
+            ),
             "NSGA-II": lambda o, s: o.samplers.NSGAIISampler(seed=s, population_size=12),
         }[name]
         kept, front_search.sampler = front_search.sampler, chosen
