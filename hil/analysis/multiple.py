@@ -124,6 +124,8 @@ def cvar(values: Sequence[float], tail: float = TAIL) -> float:
     weight = tail * known.size
     whole = math.floor(weight + 1e-12)
     part = weight - whole
+    if whole == 0:
+        return float(known[0])
     total = float(known[:whole].sum()) + (part * float(known[whole]) if part > 1e-12 else 0.0)
     return total / weight
 
@@ -173,7 +175,7 @@ def difference_seen(sd: float, pairs: int, wanted: float = 0.8) -> float:
 
 
 # Looks of `stop_at`: pairs at which the width is looked at, each half as many again as the one before.
-FIRST_LOOK = 16
+FIRST_LOOK = 24
 _GROWTH = 1.5
 # The half width at a look must be below this share of what was asked. Without it, stopping at widths
 # that are small by chance lets intervals hold the mean less often than they say (docs/statistics.md).

@@ -69,7 +69,8 @@ def command(
     seeds no candidate has seen, which says nothing of other tasks.
 
     The result is a gain set with its origin, judged at once, all laws under the same seeds. Some ten
-    minutes of two cores; a search that is interrupted keeps its runs in FILE.search, and the same command goes on.
+    minutes of two cores; a search that is interrupted keeps its runs in FILE.search, and the same command
+    goes on.
     """
     from hil.core.errors import BadInput
     from hil.study.campaign.results import program

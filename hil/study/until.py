@@ -1,6 +1,6 @@
 """Repeats until an interval is narrow enough: what `hil experiment --until-interval` does.
 
-The interval is looked at after 16 repeats, then each time there are half as many again
+The interval is looked at after 24 repeats, then each time there are half as many again
 (`hil.analysis.multiple.looks`), and only its width, never whether it holds zero: so it keeps its coverage.
 """
 

@@ -6,13 +6,13 @@ import tracemalloc
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from scipy.stats import qmc
 
 from hil.analysis import multiple
-from hil.analysis.intervals import mean_interval
+from hil.analysis.intervals import mean_interval, mean_intervals
 from hil.analysis.stats import paired
 from hil.cli.power import command as power_command
 from hil.core.errors import BadInput
+from hil.study.campaign.plan import Campaign, CampaignFile
 
 
 def test_pairs_by_the_thousand_need_little_memory():
@@ -106,54 +106,80 @@ def test_power_command_says_how_many_pairs():
 
 def test_looks_are_few_and_end_at_the_most():
     """Each has half as many again as the one before; the last is the most that is allowed."""
-    assert multiple.looks(100) == [16, 24, 36, 54, 81, 100]
+    assert multiple.looks(100) == [24, 36, 54, 81, 100]
     assert multiple.looks(8) == [8]
 
 
-def coverage(draw, mean, half_width, studies=300, most=300):
+def coverage(draw, mean, half_width, studies=600, most=121):
     """Return how often intervals at which the rule stops hold the mean, and the mean of the pairs."""
-    rng = np.random.default_rng(11)
-    held, pairs = 0, 0
-    for _ in range(studies):
-        values = draw(rng, most)
-        for count in multiple.looks(most):
-            if count == most or multiple.narrow_enough(values[:count], half_width):
-                ends = mean_interval(values[:count])
-                held += ends.low <= mean <= ends.high
-                pairs += count
-                break
+    values = draw(np.random.default_rng(11), (studies, most))
+    going, held, pairs = np.ones(studies, bool), 0, 0
+    for count in multiple.looks(most):
+        ends = mean_intervals(values[going][:, :count])
+        middle = values[going][:, :count].mean(axis=1)
+        half = np.maximum(ends[:, 1] - middle, middle - ends[:, 0])
+        stops = (half <= multiple.STOP_SHARE * half_width) | (count == most)
+        held += int(((ends[:, 0] <= mean) & (ends[:, 1] >= mean))[stops].sum())
+        pairs += count * int(stops.sum())
+        going[np.flatnonzero(going)[stops]] = False
     return held / studies, pairs / studies
+
+
+def test_the_rule_is_the_one_that_is_simulated():
+    """It stops at half widths up to the share of what was asked, not beyond."""
+    values = np.random.default_rng(13).normal(size=36)
+    ends = mean_interval(values)
+    half = max(ends.high - values.mean(), values.mean() - ends.low)
+    assert multiple.narrow_enough(values, 1.001 * half / multiple.STOP_SHARE)
+    assert not multiple.narrow_enough(values, 0.999 * half / multiple.STOP_SHARE)
 
 
 @pytest.mark.parametrize(
     ("draw", "mean", "least"),
     [
-        (lambda rng, n: rng.normal(size=n), 0.0, 0.92),
-        (lambda rng, n: rng.exponential(size=n), 1.0, 0.90),
+        (lambda rng, shape: rng.normal(size=shape), 0.0, 0.925),
+        (lambda rng, shape: rng.exponential(size=shape), 1.0, 0.905),
     ],
 )
 def test_stopping_at_a_width_keeps_coverage(draw, mean, least):
     """95 % intervals at which the rule stops hold the mean about as often as of a fixed number of pairs."""
-    held, pairs = coverage(draw, mean, 0.4)
-    assert held >= least  # 300 studies: standard error 1.3 %
-    assert 20 < pairs < 120
+    held, pairs = coverage(draw, mean, 0.45)
+    assert held >= least  # 600 studies: standard error 0.9 %
+    assert 20 < pairs < 70
 
 
 def test_stopping_where_zero_is_excluded_would_not():
     """Negative control: stopping as soon as the interval is free of zero errs twice as often as it says."""
-    rng = np.random.default_rng(12)
-    wrong = 0
-    for _ in range(300):
-        values = rng.normal(size=120)
-        wrong += any(
-            not mean_interval(values[:count]).contains_zero for count in range(16, 121, 13)
-        )
-    assert wrong / 300 > 0.10
+    values = np.random.default_rng(12).normal(size=(300, 81))
+    wrong = np.zeros(300, bool)
+    for count in multiple.looks(81):
+        ends = mean_intervals(values[:, :count])
+        wrong |= (ends[:, 0] > 0.0) | (ends[:, 1] < 0.0)
+    assert wrong.mean() > 0.10
 
 
-def test_draws_of_low_discrepancy_fill_the_box_better():
-    """What campaigns draw with: Sobol's points miss less of the mean than as many random ones."""
-    sobol = qmc.Sobol(2, seed=1).random(64)
-    plain = np.random.default_rng(1).random((64, 2))
-    worst = [abs(points.prod(axis=1).mean() - 0.25) for points in (sobol, plain)]
-    assert worst[0] < worst[1]
+def drawn_by(sampling):
+    tree = {
+        "name": "x", "scenario": "scenario-1", "draws": 32, "sampling": sampling,
+        "random": {
+            "robot.mass_kg": {"kind": "uniform", "low": 2.0, "high": 3.0},
+            "link.latency_s": {"kind": "loguniform", "low": 0.01, "high": 0.1},
+            "camera.latency_s": {"kind": "normal", "mean": 0.06, "sd": 0.02, "low": 0.02, "high": 0.1},
+        },
+    }  # fmt: skip
+    campaign = Campaign(CampaignFile.model_validate(tree), {})
+    return [campaign.drawn(draw) for draw in range(32)]
+
+
+@pytest.mark.parametrize("sampling", ["sobol", "latin"])
+def test_campaigns_draw_evenly_where_they_are_asked_to(sampling):
+    """Of 32 draws of a uniform value one lies in each 32nd; the others keep their medians."""
+    draws = drawn_by(sampling)
+    assert draws == drawn_by(sampling)
+    places = {int((point["robot.mass_kg"] - 2.0) * 32) for point in draws}
+    assert places == set(range(32))
+    below = sum(point["link.latency_s"] < 0.01 * 10**0.5 for point in draws)
+    assert below == 16
+    assert sum(point["camera.latency_s"] < 0.06 for point in draws) == 16
+    plain = {int((point["robot.mass_kg"] - 2.0) * 32) for point in drawn_by("random")}
+    assert len(plain) < 28

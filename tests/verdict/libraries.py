@@ -12,7 +12,6 @@ import time
 
 import numpy as np
 
-from hil.analysis.fronts import share_of_box
 from hil.config.control import ControlConfig
 from hil.config.deck import load_deck
 from hil.core.registries import OUTER_LAWS
@@ -28,9 +27,9 @@ CELLS = 4
 
 def with_pymoo(law, box, scores_of, candidates, seed):
     """Search the same box with pymoo's NSGA-II, the start among the first population."""
-    from pymoo.algorithms.moo.nsga2 import NSGA2
-    from pymoo.core.problem import Problem
-    from pymoo.optimize import minimize
+    from pymoo.algorithms.moo.nsga2 import NSGA2  # noqa: PLC0415 - the search itself does without
+    from pymoo.core.problem import Problem  # noqa: PLC0415 - the search itself does without
+    from pymoo.optimize import minimize  # noqa: PLC0415 - the search itself does without
 
     tried = []
 
@@ -112,7 +111,6 @@ def main():
     for (law, method), volumes in table.items():
         spread = np.std(volumes, ddof=1) / math.sqrt(len(volumes)) if len(volumes) > 1 else math.nan
         print(f"{law}, {method}: {np.mean(volumes):.4f} +- {spread:.4f}")
-    assert share_of_box([], 0.1, 10.0) == 0.0
 
 
 if __name__ == "__main__":

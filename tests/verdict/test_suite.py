@@ -89,7 +89,11 @@ def test_a_deck_with_conditions_and_no_split_is_not_tuned_on(tmp_path):
 )
 def test_a_split_leaves_something_unseen(search, told):
     """A split that names everything, or what is not there, is refused."""
-    tree = {"scenarios": ["ahead", "beside"], "conditions": {"calm": {}, "wet": {}}, "search": search}
+    tree = {
+        "scenarios": ["ahead", "beside"],
+        "conditions": {"calm": {}, "wet": {}},
+        "search": search,
+    }
     with pytest.raises(ValueError, match=told):
         Deck.model_validate(tree)
 

@@ -82,12 +82,12 @@ def add_to_deck(folder: Path, scenario: Path, law: str, seed: int) -> Path:
     """Enter a scenario in the deck of its law and seed, made where needed; return the deck's file."""
     path = folder / f"deck-{_word(law)}-seed{seed}.toml"
     names = list(read_toml(path)["scenarios"]) if path.exists() else []
-    names = list(dict.fromkeys([*names, scenario.name]))
+    names = list(dict.fromkeys([*(Path(name).name for name in names), scenario.name]))
     lines = [
         "# Counterexamples that `hil falsify` found; each fails until it is mended:",
         f"# hil experiment THIS_FILE --camera pose --seed {seed}",
         "scenarios = [",
-        *(f"  {_text(f'./{Path(name).name}')}," for name in names),
+        *(f"  {_text(f'./{name}')}," for name in names),
         "]",
         f"laws = [{_text(law)}]",
     ]
