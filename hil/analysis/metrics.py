@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from hil.analysis import sliding
+from hil.analysis.sliding import LawFacts
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME, METRICS, require_known
 
@@ -89,17 +91,24 @@ class Verdict:
         return f"{low}{self.name}{high} {self.unit}".strip()
 
 
-def compute(columns: Columns, link: LinkStats | None = None) -> Figures:
-    """Return every figure of a run from its samples; raises BadInput below two rows."""
+def compute(
+    columns: Columns, link: LinkStats | None = None, law: LawFacts | None = None
+) -> Figures:
+    """Return every figure of a run from its samples; raises BadInput below two rows.
+
+    `law` is what the figures of the sliding term need to know of the law beside its columns.
+    """
     t_s = columns["t_s"]
     if t_s.size < 2:
         raise BadInput(f"run record: {t_s.size} rows of samples, the figures need at least 2")
     true_error = has_truth(columns)
+    who = "true" if true_error else "est"
     values = (
         _error_figures(t_s, error_norm(columns))
-        | _motion_figures(columns, "true" if true_error else "est")
+        | _motion_figures(columns, who)
         | _effort_figures(columns)
         | _sliding_figures(columns)
+        | sliding.figures(columns, who, law or LawFacts())
         | _timing_figures(columns, link or LinkStats())
     )
     return Figures("truth" if true_error else "estimate", values)
@@ -169,18 +178,20 @@ def _effort_figures(columns: Columns) -> dict[str, float]:
         "eta1_variation_m_s": _variation(columns["eta1_cmd_m_s"]),
         "theta_dot_variation_rad_s": _variation(columns["theta_dot_cmd_rad_s"]),
         "pwm_variation_counts": _variation(left) + _variation(right),
-        "saturated_share": _mean(columns["saturated"]),
+        "saturated_share": _mean(columns["saturated"][sliding.law_ran(columns)]),
     }
 
 
 def _sliding_figures(columns: Columns) -> dict[str, float]:
+    ran = sliding.law_ran(columns)
     t_s, inside = columns["t_s"], columns["in_layer"]
     known = np.isfinite(inside)
-    changes = _sign_changes(columns["s_x_m_s2"]) + _sign_changes(columns["s_y_m_s2"])
+    changes = _sign_changes(columns["s_x_m_s2"][ran]) + _sign_changes(columns["s_y_m_s2"][ran])
+    ran_s = float(np.diff(t_s)[ran[:-1]].sum())
     reached = np.flatnonzero(inside == 1.0)
     return {
-        "s_sign_changes_hz": changes / float(t_s[-1] - t_s[0]) if known.any() else math.nan,
-        "in_layer_share": _mean(inside),
+        "s_sign_changes_hz": changes / ran_s if known.any() and ran_s > 0.0 else math.nan,
+        "in_layer_share": _mean(inside[ran]),
         "reaching_s": float(t_s[reached[0]] - t_s[0]) if reached.size else math.nan,
     }
 

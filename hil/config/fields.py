@@ -39,7 +39,8 @@ class Setting:
     """One key that a file or `--set` may name.
 
     `low` and `high` are bounds in `unit` (None: none); `above` and `below` say that the bound itself
-    is not allowed. `default` is None where a value must be given, `kind` names the variant of a table
+    is not allowed. `default` is None where a value must be given or may be left out (then it is
+    `optional`), `kind` names the variant of a table
     that has the key, `choices` the words a name is chosen from. In a key, `*` counts list entries.
     """
 
@@ -54,6 +55,7 @@ class Setting:
     below: bool = False
     kind: str = ""
     choices: tuple[str, ...] = ()
+    optional: bool = False
 
     def bounds(self) -> str:
         """Return the bounds in words, "" without any: "0.5 to 50", "above 0, up to 5"."""
@@ -113,6 +115,7 @@ def _setting(model: type[BaseModel], name: str, key: str, field: FieldInfo, kind
         below="lt" in limits,
         kind=kind,
         choices=_choices(field.annotation),
+        optional=not field.is_required(),
     )
 
 

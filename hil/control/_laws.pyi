@@ -33,6 +33,7 @@ class AsgIsm(Law):
     `mu_min` and `implicit` are extensions, off by default: mu stops falling at mu_min; the sliding
     term is the projection of s on the ball of radius k dt_s, which needs no layer. `dominating` is
     the gain law (4.14) as printed: no -kappa in w, k + 2 (||kappa|| + |d eps/dt|) outweighs it.
+    `radial` takes H = sigma ||p||, which no turn of the axes changes.
     """
 
     def __init__(
@@ -49,9 +50,10 @@ class AsgIsm(Law):
         componentwise: bool = ...,
         implicit: bool = ...,
         dominating: bool = ...,
+        radial: bool = ...,
     ) -> None: ...
     def cost(self, p: Sequence[float]) -> float:
-        """Return H(p) = sigma sum |p_i| (4.10)."""
+        """Return H(p) = sigma sum |p_i| (4.10), sigma ||p|| where `radial`."""
     def terms(
         self, t_s: float, p: Sequence[float], q: Sequence[float]
     ) -> tuple[Vector, Vector, Vector, Vector, Vector]:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from hil.analysis import metrics
+from hil.analysis.sliding import LawFacts
 from hil.core.errors import BadInput
 from hil.record import layout
 from hil.record.journal import Columns, read_journal, read_parquet
@@ -63,6 +64,10 @@ class RunRecord:
         }
         return metrics.LinkStats(**known)
 
+    def law_facts(self) -> LawFacts:
+        """Return what the figures of the sliding term need to know of the law that ran."""
+        return LawFacts.of(self.manifest.gains, self.manifest.scenario)
+
     def diagnoses(self) -> list[str]:
         """Return what the run found wrong with the robot and did not stop for."""
         return [event.text for event in self.events if event.kind == "diagnosis"]
@@ -71,7 +76,7 @@ class RunRecord:
         """Return the figures, computed from the samples; all are NaN below two ticks."""
         if self.samples["t_s"].size < 2:
             return metrics.no_figures(self.samples)
-        return metrics.compute(self.samples, self.link_stats())
+        return metrics.compute(self.samples, self.link_stats(), self.law_facts())
 
     def verdicts(self) -> tuple[metrics.Verdict, ...]:
         """Return the verdict on each requirement of the scenario."""

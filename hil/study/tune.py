@@ -274,6 +274,8 @@ def near_bounds(gains: Gains, laws: Sequence[str] = tuple(SEARCH)) -> list[str]:
     for outer, box in boxes_of(laws).items():
         values = gains.of(OUTER_LAWS.get(outer)).model_dump()
         for name, (low, _, high) in box.items():
+            if values[name] is None:
+                continue  # not searched: that of the limits stands
             at = math.log(values[name] / low) / math.log(high / low)
             if not 0.03 < at < 0.97:
                 found.append(f"{outer} {name} = {values[name]:g} (searched {low:g} to {high:g})")
@@ -313,6 +315,7 @@ def write_gain_set(path: Path, gains: Gains) -> None:
             if isinstance(value, str)
             else f"{key} = {value!r}"
             for key, value in values.items()
+            if value is not None
         ]
     replace_file(path, ("\n".join(lines) + "\n").encode())
 

@@ -47,7 +47,9 @@ class Item:
             bounds = f", {item.bounds()}" if item.bounds() else ""
             box = self.search.get(item.key)
             searched = f", searched {box[0]:g} to {box[2]:g}" if box else ""
-            default = "must be given" if item.default is None else _short(item.default)
+            default = _short(item.default)
+            if item.default is None:
+                default = "may be left out" if item.optional else "must be given"
             yield f"  {item.key} ({default}{bounds}{searched}{unit}): {item.meaning}"
         for name, (unit, meaning) in self.trace.items():
             yield f"records {name}{f' ({unit})' if unit else ''}: {meaning}"

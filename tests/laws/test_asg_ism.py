@@ -7,8 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hil.config.control import CircleReference, ControlConfig, OuterLimits
-from hil.control.laws.asg_ism import AsgIsm, power
+from hil.control.laws.asg_ism import AsgIsm
 from hil.control.laws.making import make_outer_law
+from hil.control.laws.stages import power
 from hil.study import ideal_circle
 from hil.study.ideal_circle import (
     CIRCLE_GAINS,

@@ -7,11 +7,14 @@ are the thesis's own; equation numbers stand beside them.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field
 
 from hil import control
-from hil.config.base import Section, quantity
-from hil.control.laws.chain import Chain, ChainState, restrict
+from hil.config.base import quantity
+from hil.control.laws.chain import Chain, ChainState
+from hil.control.laws.stages import START_BOX, Stage, StartGains, backstep, begin
 from hil.control.laws.trace import make_trace
 from hil.core.registries import OUTER_LAWS
 from hil.core.types import OuterCommand
@@ -20,11 +23,15 @@ if TYPE_CHECKING:
     from hil.config.control import OuterLimits
     from hil.core.types import Estimate, ReferenceState, Vec2
 
-# Below this error the exponents p and p - 1 are continued as at it: |d|^(p-2) has no bound at 0.
-_SMALL = 1e-3
+# H = sigma sum |delta4_i| as printed (4.10), or H = sigma ||delta4||: its sub-gradient
+# delta4/||delta4|| does not depend on the axes of the world, and the lemma's bound holds for it too.
+Cost = Annotated[
+    Literal["sum", "norm"],
+    Field(description="cost H: sum of |delta4_i| (printed), or the norm, alike in all directions"),
+]
 
 
-class AsgIsmGains(Section):
+class AsgIsmGains(StartGains):
     """Gains of backstepping with ASG-ISM (8.6)-(8.22), docs/control.md."""
 
     k1_s: float = quantity("1/s", "at p = 1, position error to speed", gt=0, le=100)
@@ -36,6 +43,7 @@ class AsgIsmGains(Section):
     eps_min_m_s2: float = quantity("m/s^2", "floor of the layer", gt=0, le=100)
     mu0_s: float = quantity("s", "mu = 1/(t + mu0)", gt=0, le=100)
     sigma_m_s2: float = quantity("m/s^2", "scale of the cost H in Psi", ge=0, le=100)
+    cost: Cost = "sum"
 
 
 # Bounds and start of a search: poles at -1, -2, -3 to begin with, as for every law (inside its layer
@@ -48,18 +56,12 @@ SEARCH = {
     "eps_min_m_s2": (0.01, 0.5, 5.0),
     "mu0_s": (0.2, 1.0, 30.0),
     "sigma_m_s2": (1e-3, 0.01, 1.0),
-}
+} | START_BOX
 
 
-def power(d: float, d_dot: float, d_ddot: float, k: float, p: float) -> tuple[float, float, float]:
-    """Return k |d|^p sgn(d) and its first two time derivatives."""
-    if p == 1.0:
-        return k * d, k * d_dot, k * d_ddot
-    size = max(abs(d), _SMALL)
-    slope = k * p * size ** (p - 1.0)
-    bend = slope * (p - 1.0) / size * math.copysign(1.0, d) if abs(d) > _SMALL else 0.0
-    value = k * abs(d) ** p
-    return math.copysign(value, d), slope * d_dot, bend * d_dot * d_dot + slope * d_ddot
+def is_norm(cost: str) -> bool:
+    """Say whether the cost H is sigma ||delta4||, and not sigma sum |delta4_i|."""
+    return cost == "norm"
 
 
 @OUTER_LAWS.register(
@@ -86,12 +88,12 @@ class AsgIsm:
             beta=gains.beta,
             mu0_s=gains.mu0_s,
             sigma=gains.sigma_m_s2,
+            radial=is_norm(gains.cost),
         )
 
     def reset(self, reference: ReferenceState, estimate: Estimate) -> None:
         """Start anew: integrals to zero, gamma = -mu0 delta3(0) so that s(0) = 0."""
-        z1, z1_ref = estimate.z1_m, reference.z1_m
-        self._chain.reset(estimate, (z1_ref[0] - z1[0], z1_ref[1] - z1[1]))
+        begin(self._chain, reference, estimate, self._gains.zeta_start_m_s2)
         self._t = 0.0
         self._delta4 = (0.0, 0.0)
         delta3, _ = self._backstep(reference, estimate, self._chain.state(estimate))
@@ -108,26 +110,18 @@ class AsgIsm:
         x, y = self._block.eta
         return x, y
 
-    def _backstep(
-        self, reference: ReferenceState, estimate: Estimate, state: ChainState
-    ) -> tuple[Vec2, Vec2]:
+    def _backstep(self, reference: ReferenceState, estimate: Estimate, state: ChainState) -> Stage:
         """Return delta3 and d z3*/dt through the stages (8.6), (8.11) with restrictions."""
-        gains, limits = self._gains, self._limits
-        (x, y), (x_ref, y_ref) = estimate.z1_m, reference.z1_m
-        (vx, vy), (vx_ref, vy_ref) = state.z2, reference.z1_dot_m_s
-        (ax, ay), (ax_ref, ay_ref) = state.z3, reference.z1_ddot_m_s2
-        px, px_dot, px_ddot = power(x - x_ref, vx - vx_ref, ax - ax_ref, gains.k1_s, gains.p)
-        py, py_dot, py_ddot = power(y - y_ref, vy - vy_ref, ay - ay_ref, gains.k1_s, gains.p)
-        g, g_dot, g_ddot = restrict(
-            (px, py), (px_dot, py_dot), (px_ddot, py_ddot), limits.approach_speed_m_s
+        gains = self._gains
+        return backstep(
+            reference,
+            estimate,
+            state,
+            k1_s=gains.k1_s,
+            k2_s=gains.k2_s,
+            p=gains.p,
+            limits=self._limits,
         )
-        # z2* = z1*_dot - g, so delta2 = z2 - z1*_dot + g (8.9) and z3* = z2*_dot - r (8.11)
-        qx, qx_dot, _ = power(vx - vx_ref + g[0], ax - ax_ref + g_dot[0], 0.0, gains.k2_s, gains.p)
-        qy, qy_dot, _ = power(vy - vy_ref + g[1], ay - ay_ref + g_dot[1], 0.0, gains.k2_s, gains.p)
-        r, r_dot, _ = restrict((qx, qy), (qx_dot, qy_dot), (0.0, 0.0), limits.approach_accel_m_s2)
-        jx_ref, jy_ref = reference.z1_dddot_m_s3
-        delta3 = (ax - ax_ref + g_dot[0] + r[0], ay - ay_ref + g_dot[1] + r[1])
-        return delta3, (jx_ref - g_ddot[0] - r_dot[0], jy_ref - g_ddot[1] - r_dot[1])
 
     def step(self, reference: ReferenceState, estimate: Estimate, dt_s: float) -> OuterCommand:
         """Return the command for the next `dt_s`."""

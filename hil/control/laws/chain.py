@@ -79,8 +79,13 @@ class Chain:
         self._eta1_ref = 0.0
         self._w_ref = 0.0
 
-    def reset(self, estimate: Estimate, towards: Vec2) -> None:
-        """Start from the estimated speeds; at standstill zeta starts along `towards` (world)."""
+    def reset(
+        self, estimate: Estimate, towards: Vec2, zeta_start_m_s2: float | None = None
+    ) -> None:
+        """Start from the estimated speeds; at standstill zeta starts along `towards` (world).
+
+        It starts at `zeta_start_m_s2`, or at what the limits say where that is None.
+        """
         limits = self._limits
         theta = estimate.pose.theta_rad
         self._eta1_ref = clip(estimate.eta1_m_s, limits.eta1_max_m_s)
@@ -88,7 +93,8 @@ class Chain:
         self.zeta = 0.0
         if abs(estimate.eta1_m_s) < limits.lambda_m_s:
             ahead = math.cos(theta) * towards[0] + math.sin(theta) * towards[1]
-            self.zeta = math.copysign(limits.zeta_start_m_s2, ahead)
+            start = limits.zeta_start_m_s2 if zeta_start_m_s2 is None else zeta_start_m_s2
+            self.zeta = math.copysign(start, ahead)
 
     def state(self, estimate: Estimate) -> ChainState:
         """Return z2, z3 from the estimate; z3 from zeta unless the estimator observes it."""
@@ -142,6 +148,19 @@ class Chain:
             clip(w + lead * (w_dot if w == w_free else 0.0), limits.theta_dot_max_rad_s),
             saturated,
         )
+
+
+def executed_jerk(state: ChainState, out: ChainCommand, zeta_next: float, dt_s: float) -> Vec2:
+    """Return the jerk (world) that a command makes of the model once the limits have had their say.
+
+    `zeta_next` is the chain's zeta after it: what v1 was worth.
+    """
+    along = (zeta_next - out.zeta) / dt_s - state.eta1 * state.w * state.w
+    across = 2.0 * out.zeta * state.w + state.eta1 * out.w_dot
+    return (
+        state.cos * along - state.sin * across,
+        state.sin * along + state.cos * across,
+    )
 
 
 def restrict(value: Vec2, rate: Vec2, accel: Vec2, limit: float | None) -> tuple[Vec2, Vec2, Vec2]:

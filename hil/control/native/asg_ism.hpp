@@ -9,7 +9,8 @@
 // With `dominating` the gain law (4.14) as printed: no -kappa in w, the gain outweighs it instead,
 // k(t) = k + 2 (||kappa|| + |d eps/dt|).
 //
-// Two extensions, both off by default: mu stops falling at mu_min (d mu/dt = 0 from there), and the
+// Three extensions, all off by default: `radial` takes the cost H = sigma ||p||, whose sub-gradient
+// sigma p/||p|| does not depend on the axes, in place of sigma sum |p_i|; mu stops falling at mu_min (d mu/dt = 0 from there), and the
 // sliding term in implicit form, -P(s)/h with P the projection on the ball of radius k h.
 #pragma once
 
@@ -27,7 +28,7 @@ struct AsgGains {
   double eps0 = 0.0, beta = 0.5;
   double mu0 = 1.0, mu_min = 0.0;
   double sigma = 1.0;  // scale of the cost H = sigma sum |p_i|
-  bool componentwise = false, implicit = false, dominating = false;
+  bool componentwise = false, implicit = false, dominating = false, radial = false;
 };
 
 struct AsgTerms {
@@ -41,12 +42,13 @@ class AsgIsm : public Law {
 
   int dim() const override { return gains_.n; }
   double cost(const Vec& p) const {
+    if (gains_.radial) return gains_.sigma * norm(p, gains_.n);
     double sum = 0.0;
     for (int i = 0; i < gains_.n; ++i) sum += std::abs(p[i]);
     return gains_.sigma * sum;
   }
   const Vec& eta() const { return eta_; }
-  const Vec& averaged() const { return sum_; }  // integral of sigma sgn(p)
+  const Vec& averaged() const { return sum_; }  // integral of the sub-gradient
 
   void reset(const Vec& p, const Vec& q) override {
     sum_ = {};
@@ -104,8 +106,9 @@ class AsgIsm : public Law {
     const bool floored = falling <= gains_.mu_min;
     out.mu = floored ? gains_.mu_min : falling;
     const double layer = gains_.eps0 * std::pow(falling, 1.0 + gains_.beta);
+    const double length = gains_.radial ? norm(p, gains_.n) : 0.0;
     for (int i = 0; i < gains_.n; ++i) {
-      out.dh[i] = gains_.sigma * sign(p[i]);
+      out.dh[i] = !gains_.radial ? gains_.sigma * sign(p[i]) : length > 0.0 ? gains_.sigma * p[i] / length : 0.0;
       out.psi[i] = out.mu * sum_[i];
       const double pulled = out.mu * (p[i] + eta_[i]);
       out.s[i] = q[i] + pulled + out.psi[i];

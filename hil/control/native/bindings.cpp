@@ -65,7 +65,7 @@ void bind_asg(nb::module_& m) {
   nb::class_<AsgIsm, Law>(m, "AsgIsm")
       .def("__init__", [](AsgIsm* self, const List& k, const List& eps_min, double mu0_s, double sigma,
                           const List& kd, double eps0, double beta, double mu_min, bool componentwise,
-                          bool implicit, bool dominating) {
+                          bool implicit, bool dominating, bool radial) {
         AsgGains gains;
         gains.n = dimension(k);
         gains.k = vec(k, gains.n);
@@ -79,10 +79,11 @@ void bind_asg(nb::module_& m) {
         gains.componentwise = componentwise;
         gains.implicit = implicit;
         gains.dominating = dominating;
+        gains.radial = radial;
         new (self) AsgIsm(gains);
       }, nb::kw_only(), "k"_a, "eps_min"_a, "mu0_s"_a, "sigma"_a, "kd"_a = List{}, "eps0"_a = 0.0,
          "beta"_a = 0.5, "mu_min"_a = 0.0, "componentwise"_a = false, "implicit"_a = false,
-         "dominating"_a = false)
+         "dominating"_a = false, "radial"_a = false)
       .def("cost", [](const AsgIsm& law, const List& p) { return law.cost(vec(p, law.dim())); }, "p"_a)
       .def("terms", [](AsgIsm& law, double t, const List& p, const List& q) {
         const int n = law.dim();

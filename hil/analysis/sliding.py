@@ -1,0 +1,160 @@
+"""What the sliding term of a law does, over the ticks in which the law ran.
+
+While the control stop holds the robot (hil/control/laws/hold.py) no law runs, and nothing of it counts.
+
+The disturbance is what acts on the third derivative of the flat output beyond what the law reckons
+with: C xi + D xi_dot of (2.36). With what xi makes of the body's accelerations, a1 = d eta1/dt - zeta
+and a_w = d theta_dot/dt - w_dot, it has the parts d a1/dt along the heading and 2 theta_dot a1 +
+eta1 a_w across (tests/laws/test_chain.py proves that these are the corrected matrices). On a simulated
+robot the motion is the true one; on a rig it is the estimated one, and the disturbance is then the
+residual of the chain. Slopes are taken over +-1/15 s: what is faster no law at 30 Hz answers, and
+over one tick the estimate's noise would be most of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+    Columns = Mapping[str, Array]
+
+HALF_SPAN_S = 1.0 / 15.0
+# A sliding mode acts with alpha of this times the disturbance's 90 % bound (alpha > 2 D), and with
+# ||s|| <= eps in this share of the ticks.
+GAIN_RATIO = 2.0
+IN_LAYER_SHARE = 0.99
+
+# A command of the control stop: the law did not run in this tick.
+_RESTING = ("v1_m_s3", "u2_m_s2", "zeta_m_s2", "eta1_cmd_m_s", "theta_dot_cmd_rad_s")
+
+
+@dataclass(frozen=True, slots=True)
+class LawFacts:
+    """What the figures need to know of a law beside its columns; NaN where it has no such thing.
+
+    `alpha_m_s3` is the gain of its sliding term, `d0_m` the offset of the flat output as believed,
+    `accel_max_m_s2` the limit on zeta.
+    """
+
+    alpha_m_s3: float = math.nan
+    d0_m: float = math.nan
+    accel_max_m_s2: float = math.nan
+
+    @classmethod
+    def of(cls, gains: Mapping[str, Any], scenario: Mapping[str, Any]) -> LawFacts:
+        """Return the facts of a law's gains and a resolved scenario, as a manifest holds them."""
+        alpha = gains.get("outer", {}).get("alpha_m_s3")
+        limits = scenario.get("control", {}).get("limits", {})
+        return cls(
+            math.nan if alpha is None else float(alpha),
+            float(scenario.get("robot", {}).get("d0_m", math.nan)),
+            float(limits.get("zeta_max_m_s2", math.nan)),
+        )
+
+
+def law_ran(columns: Columns) -> NDArray[np.bool_]:
+    """Return at which ticks the law ran: all but those in which the control stop commands rest."""
+    resting: NDArray[np.bool_] = np.all([columns[name] == 0.0 for name in _RESTING], axis=0)
+    return ~resting
+
+
+def disturbance(columns: Columns, who: str, d0_m: float) -> Array:
+    """Return |C xi + D xi_dot| in m/s^3 at the ticks with the law running all around them.
+
+    `who` is the prefix of the columns of motion: "true" or "est". Empty below nine such ticks.
+    """
+    t_s = columns["t_s"]
+    tick_s = float(np.median(np.diff(t_s)))
+    half = max(round(HALF_SPAN_S / tick_s), 1)
+    if t_s.size <= 4 * half or not math.isfinite(d0_m):
+        return np.empty(0)
+    eta1, w = columns[f"{who}_eta1_m_s"], columns[f"{who}_theta_dot_rad_s"]
+    a1 = _slope(eta1, half, tick_s) - _mean_around(columns["zeta_m_s2"], half)
+    a_w = _slope(w, half, tick_s) + _mean_around(columns["u2_m_s2"], half) / d0_m
+    inner = slice(2 * half, -2 * half)
+    along = _slope(a1, half, tick_s)
+    across = 2.0 * w[inner] * a1[half:-half] + eta1[inner] * a_w[half:-half]
+    whole = _mean_around(law_ran(columns).astype(float), 2 * half) > 1.0 - 1e-9
+    size = np.hypot(along, across)
+    return size[whole & np.isfinite(size)]
+
+
+def figures(columns: Columns, who: str, facts: LawFacts) -> dict[str, float]:
+    """Return the figures of the sliding term; NaN for a law without a sliding variable."""
+    ran = law_ran(columns)
+    s, eps = np.hypot(columns["s_x_m_s2"], columns["s_y_m_s2"])[ran], columns["eps_m_s2"][ran]
+    size = disturbance(columns, who, facts.d0_m) if np.isfinite(s).any() else np.empty(0)
+    middle, bound, most = np.percentile(size, [50, 90, 100]) if size.size else (math.nan,) * 3
+    ratio = facts.alpha_m_s3 / bound if bound > 0.0 else math.nan
+    layered = s.size > 0 and bool(np.isfinite(s + eps).all())
+    inside = float(np.mean(s <= eps)) if layered else math.nan
+    thin = bool(layered and (eps < facts.accel_max_m_s2).all())
+    acts = ratio >= GAIN_RATIO and inside >= IN_LAYER_SHARE and thin
+    known = layered and math.isfinite(ratio)
+    return {
+        "law_ticks": float(np.count_nonzero(ran)),
+        "disturbance_median_m_s3": float(middle),
+        "disturbance_90_m_s3": float(bound),
+        "disturbance_max_m_s3": float(most),
+        "alpha_over_d90_ratio": float(ratio),
+        "s_over_eps_median_ratio": float(np.median(s / eps)) if layered else math.nan,
+        "sliding_term_share": _share(columns, ran, facts) if size.size else math.nan,
+        "s_settling_s": _settling(columns["t_s"][ran], s <= eps) if layered else math.nan,
+        "sliding_acts": float(acts) if known else math.nan,
+    }
+
+
+def _share(columns: Columns, ran: NDArray[np.bool_], facts: LawFacts) -> float:
+    """Return the median share of the sliding term in the jerk commanded.
+
+    ||term|| / (||term|| + ||rest||), the rest being what the command has beside it. The term is
+    alpha s/(||s|| + eps), or what the law's own columns say.
+    """
+    term_x, term_y = (values[ran] for values in _terms(columns, facts))
+    v1, u2, zeta = (columns[name][ran] for name in ("v1_m_s3", "u2_m_s2", "zeta_m_s2"))
+    theta, eta1, w = (
+        columns[f"est_{name}"][ran] for name in ("theta_rad", "eta1_m_s", "theta_dot_rad_s")
+    )
+    along, across = v1 - eta1 * w * w, 2.0 * zeta * w - eta1 * u2 / facts.d0_m  # A + B v
+    cos, sin = np.cos(theta), np.sin(theta)
+    term = np.hypot(term_x, term_y)
+    rest = np.hypot(cos * along - sin * across - term_x, sin * along + cos * across - term_y)
+    both = term + rest
+    if not np.isfinite(both).any():
+        return math.nan
+    return float(np.nanmedian(np.divide(term, both, out=np.zeros_like(term), where=both > 0.0)))
+
+
+def _terms(columns: Columns, facts: LawFacts) -> tuple[Array, Array]:
+    """Return the sliding term in the jerk wanted, world X and Y."""
+    if "slide_x_m_s3" in columns:
+        return columns["slide_x_m_s3"], columns["slide_y_m_s3"]
+    s_x, s_y = columns["s_x_m_s2"], columns["s_y_m_s2"]
+    pull = -facts.alpha_m_s3 / (np.hypot(s_x, s_y) + columns["eps_m_s2"])
+    return pull * s_x, pull * s_y
+
+
+def _settling(t_s: Array, inside: NDArray[np.bool_]) -> float:
+    """Return the time from the first tick of the law after which ||s|| <= eps; NaN where never."""
+    outside = np.flatnonzero(~inside)
+    first = int(outside[-1]) + 1 if outside.size else 0
+    return float(t_s[first] - t_s[0]) if first < t_s.size else math.nan
+
+
+def _slope(values: Array, half: int, tick_s: float) -> Array:
+    """Return the slope over +-half ticks."""
+    return np.asarray((values[2 * half :] - values[: -2 * half]) / (2 * half * tick_s))
+
+
+def _mean_around(values: Array, half: int) -> Array:
+    """Return the mean over +-half ticks."""
+    width = 2 * half + 1
+    return np.convolve(values, np.full(width, 1.0 / width), "valid")
