@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from hil.core.registry import Entry
 
 # A gain at zero is the part off: part -> gain.
-_BY_GAIN = {"alpha": "alpha_m_s3", "psi": "sigma_m_s2", "integral": "ki_s4"}
+_BY_GAIN = {"alpha": "alpha_m_s3", "psi": "sigma_m_s2", "integral": "ki_s4", "start": "zeta_start_m_s2"}
 _BY_BLOCK: Mapping[str, Any] = {"kappa": WithoutKappa, "gamma": WithoutGamma}
 _BY_LIMIT: Mapping[str, Mapping[str, float | None]] = {
     "restrictions": {"approach_speed_m_s": None, "approach_accel_m_s2": None},
@@ -44,6 +44,7 @@ MEANING = {
     "integral": "gain of the integral at 0",
     "kappa": "kappa left out of the command",
     "gamma": "gamma at 0: s does not start at 0",
+    "start": "zeta starts at 0 at standstill",
     "feed-forward": "derivatives of the reference taken as 0",
     "restrictions": "no bound on what position and velocity error ask for",
     "lead": "set-points without their lead",

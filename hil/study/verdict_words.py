@@ -67,7 +67,7 @@ class AtLevel:
 
 def is_sliding(law: str) -> bool:
     """Say whether a law has a sliding variable, as it declares where it is registered."""
-    return bool(OUTER_LAWS.get(law).extra.get("sliding", law != BASELINE))
+    return bool(OUTER_LAWS.get(law).extra.get("sliding", False))
 
 
 def seeds_of(data: Data) -> list[int]:
