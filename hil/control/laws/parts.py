@@ -67,8 +67,8 @@ class WithoutGamma:
 
 
 def has_block(law: object) -> bool:
-    """Say whether a law stands on a sliding block, whose kappa and gamma can be left out."""
-    return hasattr(getattr(law, "_block", None), "terms")
+    """Say whether a law takes kappa and gamma from a sliding block that it keeps over a start."""
+    return hasattr(law, "gamma_m_s") and hasattr(getattr(law, "_block", None), "terms")
 
 
 def replace_block(law: Any, wrapper: type[WithoutKappa | WithoutGamma]) -> None:
