@@ -40,14 +40,14 @@ if TYPE_CHECKING:
               help="Processes on this machine; the result is the same. [default: one a core]")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
               help="Where the data go. [default: verdict.json in a new folder of runs/]")  # fmt: skip
-@click.option("--kept", type=click.Path(path_type=Path, dir_okay=False, exists=True), metavar="FILE",
-              help="Only say what the data of an earlier verdict say; no run.")  # fmt: skip
+@click.option("--kept", metavar="FILE",
+              help="No run: say what the data of an earlier verdict say; shipped: those of README.")  # fmt: skip
 @json_option
 def command(
     deck: str,
     outers: tuple[str, ...],
     short: bool,
-    kept: Path | None,
+    kept: str | None,
     out: Path | None,
     workers: int | None,
     ablated: bool,
@@ -111,18 +111,19 @@ def _make(pool: Any) -> Make:
     return make
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read(name: str) -> dict[str, Any]:
     from hil.core.errors import BadInput
-    from hil.study.verdict import FORMAT
+    from hil.study.verdict import FORMAT, shipped_text
 
     try:
-        data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        text = shipped_text() if name == "shipped" else Path(name).read_text(encoding="utf-8")
+        data: dict[str, Any] = json.loads(text)
         known = data["format"] == FORMAT
-    except (ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError):
         known = False
     if not known:
         raise BadInput(
-            f"--kept {path}: is no data of `hil verdict`; give the verdict.json that it wrote"
+            f"--kept {name}: is no data of `hil verdict`; give the verdict.json that it wrote"
         )
     return data
 

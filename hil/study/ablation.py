@@ -31,7 +31,12 @@ if TYPE_CHECKING:
     from hil.core.registry import Entry
 
 # A gain at zero is the part off: part -> gain.
-_BY_GAIN = {"alpha": "alpha_m_s3", "psi": "sigma_m_s2", "integral": "ki_s4", "start": "zeta_start_m_s2"}
+_BY_GAIN = {
+    "alpha": "alpha_m_s3",
+    "psi": "sigma_m_s2",
+    "integral": "ki_s4",
+    "start": "zeta_start_m_s2",
+}
 _BY_BLOCK: Mapping[str, Any] = {"kappa": WithoutKappa, "gamma": WithoutGamma}
 _BY_LIMIT: Mapping[str, Mapping[str, float | None]] = {
     "restrictions": {"approach_speed_m_s": None, "approach_accel_m_s2": None},

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
+from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from hil.config.control import ControlConfig
@@ -67,6 +68,11 @@ class VerdictPlan:
         return laws * (len(self.search_seeds) * (search + unseen) + shipped) + (
             (parts + laws) * self.ablation_cells * self.repeats
         )
+
+
+def shipped_text() -> str:
+    """Return the data of the verdict that README tells."""
+    return (files("hil") / "data" / "verdict.json").read_text(encoding="utf-8")
 
 
 SHORT = VerdictPlan(
