@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
               help="Where the data go. [default: verdict.json in a new folder of runs/]")  # fmt: skip
 @click.option("--kept", metavar="FILE",
-              help="No run: say what the data of an earlier verdict say; shipped: those of README.")  # fmt: skip
+              help="No run: what the data of an earlier verdict say; shipped: those of README.")  # fmt: skip
 @json_option
 def command(
     deck: str,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
+from pathlib import Path
 from typing import Any, Self
 
 from pydantic import Field, model_validator
@@ -130,10 +131,24 @@ def _cells(scenarios: Sequence[str], conditions: Sequence[str]) -> list[Cell]:
     return [Cell(scenario=a, condition=b) for a, b in product(scenarios, conditions)]
 
 
+def _beside(folder: Path, name: Any) -> Any:
+    """Return the path of a scenario's file that is not here but beside the deck; else as it is."""
+    if isinstance(name, str) and name.endswith(".toml") and not Path(name).is_file():
+        return str(folder / name) if (folder / name).is_file() else name
+    return name
+
+
 def load_deck(name_or_path: str, laws: Sequence[str] = ()) -> Deck:
     """Return a built-in deck or one from a TOML file; raises BadInput.
 
-    `laws` take the place of its own: names, or files.
+    `laws` take the place of its own: names, or files. Files of scenarios are looked for here, then beside
+    the deck.
     """
     tree = read_tree(name_or_path, "decks")
+    if name_or_path.endswith(".toml"):
+        folder = Path(name_or_path).parent
+        for table in (tree, tree.get("search", {})):
+            names = table.get("scenarios") if isinstance(table, dict) else None
+            if isinstance(names, list):
+                table["scenarios"] = [_beside(folder, name) for name in names]
     return build(Deck, tree | {"laws": list(laws)} if laws else tree, name_or_path)

@@ -28,6 +28,7 @@ from hil.study.suite import (
     refuse_seen,
     scenarios_of,
     spread_over,
+    task_of,
     together,
 )
 from hil.study.tune import boxes_of
@@ -116,8 +117,9 @@ class Field:
 
     @property
     def tasks(self) -> list[str]:
-        """Return the tasks' names."""
-        return list(self.deck.scenarios)
+        """Return the tasks that are run."""
+        used = {task_of(cell) for cell in (*self.search, *self.unseen, *self.ablated)}
+        return [name for name in self.deck.scenarios if name in used]
 
 
 def verdict_data(

@@ -33,7 +33,7 @@ def runs(better):
                 else getattr(job.gains, job.outer.replace("-", "_")).model_dump()
             )
             loud = gains.get("k1_s", gains.get("kd2_s", 6.0) / 6.0)
-            luck = 1.0 + 0.02 * (hash((job.cell, job.seed)) % 7 + place % 2)
+            luck = 1.0 + 0.02 * (len(job.cell) % 7 + place % 2)
             error = luck * better.get(job.outer, 1.0) / loud
             values = dict.fromkeys(KEPT, loud)
             found.append(values | {"iae_m_s": error, "delta1_worst_last_second_m": 0.005 * error})
@@ -131,15 +131,15 @@ def test_page_draws_every_law_and_says_the_first_line(told, tmp_path):
 
 
 def test_short_is_a_fraction_of_the_whole():
-    """CI's budget is below a twentieth of the runs of the default."""
-    assert SHORT.runs(8, 60) < VerdictPlan().runs(8, 60) / 20
+    """CI's budget is below a fifteenth of the runs of the default."""
+    assert SHORT.runs(8, 60) < VerdictPlan().runs(8, 60) / 15
 
 
 def test_verdict_from_the_command_line(tmp_path):
     """Real runs of one law against another, the smallest budget there is; data, report and words."""
     out = tmp_path / "verdict.json"
     asked = ["--outer", "pid", "--outer", "backstepping", "--candidates", "4", "--search-cells", "1",
-             "--search-seed", "1", "--points", "2", "--unseen-cells", "2", "--no-ablation",
+             "--search-seed", "1", "--points", "2", "--unseen-cells", "2", "--no-ablation", "--ablation-cells", "2",
              "--workers", "1", "--out", str(out), "--json"]  # fmt: skip
     run = CliRunner().invoke(command, asked, standalone_mode=False, catch_exceptions=False)
     document = json.loads(run.stdout)
