@@ -139,8 +139,8 @@ def test_verdict_from_the_command_line(tmp_path):
     """Real runs of one law against another, the smallest budget there is; data, report and words."""
     out = tmp_path / "verdict.json"
     asked = ["--outer", "pid", "--outer", "backstepping", "--candidates", "4", "--search-cells", "1",
-             "--search-seed", "1", "--points", "2", "--unseen-cells", "2", "--no-ablation", "--ablation-cells", "2",
-             "--workers", "1", "--out", str(out), "--json"]  # fmt: skip
+             "--search-seed", "1", "--points", "2", "--unseen-cells", "2", "--no-ablation",
+             "--ablation-cells", "2", "--workers", "1", "--out", str(out), "--json"]  # fmt: skip
     run = CliRunner().invoke(command, asked, standalone_mode=False, catch_exceptions=False)
     document = json.loads(run.stdout)
     assert json.loads(out.read_text()) == document["data"]

@@ -118,7 +118,7 @@ class Distribution(Section):
         if self.kind == "uniform":
             return self.low + share * (self.high - self.low)
         if self.kind == "loguniform":
-            return self.low * (self.high / self.low) ** share
+            return float(self.low * (self.high / self.low) ** share)
         bell = NormalDist(self.mean, self.sd)
         below, above = bell.cdf(self.low), bell.cdf(self.high)
         inside = min(max(below + share * (above - below), 1e-12), 1.0 - 1e-12)
