@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -122,7 +122,9 @@ def _searched(
     from hil.study.campaign.workers import Pool
     from hil.study.tuning_verdict import held_out_trials, judge, pairs_of, with_verdict
 
-    worker = tune.OnTarget("twin", camera, dict(tasks.known) if tasks.own else {})
+    worker: Any = tune.OnTarget("twin", camera, dict(tasks.known) if tasks.own else {})
+    if tasks.conditions:
+        worker = _by_task(tasks, worker, workers)
     with stage_progress() as stage, Pool(worker, workers or os.cpu_count() or 1) as pool:
         steps: dict[str, Stage] = {}
 
@@ -151,6 +153,25 @@ def _searched(
     for verdict in verdicts[::-1]:
         gains = with_verdict(gains, verdict)
     return gains, verdicts
+
+
+def _by_task(tasks: Tasks, worker: Any, workers: int | None) -> Any:
+    """Return a worker whose costs are normalised by what the yardstick gives on each task, calm."""
+    from hil.config.control import ControlConfig
+    from hil.study import suite
+    from hil.study.campaign.workers import Pool
+    from hil.study.tune import Case, Trial
+
+    gains = ControlConfig().active_gains
+    names = list(tasks.calm)
+    trials = [
+        Trial(suite.YARDSTICK_LAW, gains, Case(name, "calm", "asg-ism"), suite.YARDSTICK_SEED)
+        for name in names
+    ]
+    with Pool(worker, workers or os.cpu_count() or 1) as pool:
+        found = pool.map(trials, lambda _place, _figures: None)
+    usual = {name.partition("-in-")[0]: f for name, f in zip(names, found, strict=True)}
+    return suite.ByTask(worker, suite.Yardstick.of(usual))
 
 
 def _print(out: Path, gains: Gains, laws: Sequence[str], verdicts: Sequence[Verdict]) -> None:

@@ -18,7 +18,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hil.config.deck import CALM, Cell, Deck
 from hil.core.errors import BadInput
@@ -39,6 +39,10 @@ _IAE, _REST = "iae_m_s", "delta1_worst_last_second_m"
 KEPT = (_IAE, _REST, *_CALM, _EFFORT)
 
 Figures = Mapping[str, float]
+
+
+# What one number makes of the three scores, where a search needs one (`hil tune`).
+COST = (1.0, 0.2, 0.05)
 
 
 class Scores(NamedTuple):
@@ -119,7 +123,11 @@ class Yardstick:
             Job(YARDSTICK_LAW, None, str(Cell(scenario=task, condition=CALM)), YARDSTICK_SEED)
             for task in tasks
         ]
-        found = dict(zip(tasks, make(jobs), strict=True))
+        return cls.of(dict(zip(tasks, make(jobs), strict=True)))
+
+    @classmethod
+    def of(cls, found: Mapping[str, Figures]) -> Yardstick:
+        """Return the yardstick of figures by task; raises BadInput where a task has none."""
         for task, figures in found.items():
             if not figures:
                 raise BadInput(
@@ -139,6 +147,26 @@ class Yardstick:
 
         accuracy = _IAE_SHARE * over(_IAE) + (1.0 - _IAE_SHARE) * over(_REST, LEAST_REST_M)
         return Scores(accuracy, sum(map(over, _CALM)) / len(_CALM), over(_EFFORT))
+
+
+@dataclass(frozen=True, slots=True)
+class ByTask:
+    """Makes runs as another worker does and adds their cost, normalised by their task.
+
+    `work` takes jobs with a `case.scenario` named TASK-in-CONDITION.
+    """
+
+    work: Callable[[Any], Figures]
+    yardstick: Yardstick
+
+    def __call__(self, trial: Any) -> Figures:
+        """Return the figures of one run with its cost; none of a run that ends early."""
+        figures = self.work(trial)
+        if not figures:
+            return figures
+        task = trial.case.scenario.partition("-in-")[0]
+        scores = self.yardstick.scores(f"{task} in it", figures)
+        return {**figures, "cost": sum(a * b for a, b in zip(COST, scores, strict=True))}
 
 
 def together(scores: Sequence[Scores]) -> Scores:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import IO, Any, Self
 
 from hil.config.control import ControlConfig, PointReference
-from hil.config.deck import Cell, Deck, load_deck
+from hil.config.deck import CALM, Cell, Deck, load_deck
 from hil.config.gains import Gains, only_gains_of
 from hil.config.load import build, builtin_names, load_robot, load_scenario
 from hil.config.scenario import Scenario
@@ -53,6 +53,7 @@ class Tasks:
     own: bool
     robot: str | None
     unseen: Mapping[str, Scenario] = field(default_factory=dict)
+    calm: Mapping[str, Scenario] = field(default_factory=dict)
     conditions: bool = False
 
     @property
@@ -67,8 +68,8 @@ class Tasks:
 
     @property
     def known(self) -> dict[str, Scenario]:
-        """Return every scenario, searched or judged."""
-        return {**self.scenarios, **self.unseen}
+        """Return every scenario that is run: searched, judged, or that costs are normalised by."""
+        return {**self.scenarios, **self.unseen, **self.calm}
 
     @property
     def base(self) -> Gains:
@@ -157,7 +158,8 @@ def _of_deck(deck: Deck, name: str, robot: str | None, overrides: Sequence[str])
         found = (_on_robot(deck.scenario_of(cell, overrides), robot) for cell in cells)
         return {task.name: task for task in found}
 
-    return Tasks(loaded(seen), True, robot, loaded(deck.unseen_cells()), conditions=True)
+    calm = loaded([Cell(scenario=name, condition=CALM) for name in deck.scenarios])
+    return Tasks(loaded(seen), True, robot, loaded(deck.unseen_cells()), calm, conditions=True)
 
 
 def _is_deck(name: str) -> bool:

@@ -38,7 +38,7 @@ def test_fewer_repeats_than_the_first_look_are_never_enough(records):
     assert not Until.of("iae_m_s", 10.0, "twin").reached(records[:10], lambda _text: None)
 
 
-def test_parts_grow_by_half_and_share_their_beginning(records):
+def test_parts_grow_by_half_and_share_their_beginning():
     """Each part holds the runs of the one before, so that none is made twice."""
     specs = [
         RunSpec(None, "twin", "pose", law, "asg-ism", seed, Path())

@@ -14,13 +14,14 @@ from hil.study.suite import (
     FAILED,
     KEPT,
     MOST,
+    ByTask,
     Scores,
     Yardstick,
     refuse_seen,
     spread_over,
     together,
 )
-from hil.study.tune import Case, Trial
+from hil.study.tune import Case, Trial, run_cost
 from hil.study.tune_work import load_tasks
 from hil.study.tuning_verdict import judge
 
@@ -195,6 +196,21 @@ def test_scores_are_normalised_by_the_task():
     assert yard.scores("small in calm", {}) == FAILED
     assert yard.scores("small in calm", figures_of(math.nan)) == FAILED
     assert max(yard.scores("small in calm", figures_of(1e9, 9.0))) == MOST
+
+
+def test_tune_counts_runs_of_the_suite_by_their_task():
+    """A run twice as bad as the yardstick in all costs 2 (1 + 0.2 + 0.05), whatever the task's size."""
+
+    def work(trial):
+        return figures_of(2.0 * size[trial.case.scenario.partition("-in-")[0]], 0.04)
+
+    size = {"small": 0.01, "large": 50.0}
+    yard = Yardstick.of({name: figures_of(usual, 0.02) for name, usual in size.items()})
+    for name in size:
+        trial = Trial("pid", None, Case(f"{name}-in-slope", "calm", "pid"), 1)
+        assert run_cost(ByTask(work, yard)(trial)) == pytest.approx(2.5)
+    with pytest.raises(BadInput, match="ends early in it"):
+        Yardstick.of({"small": {}})
 
 
 def test_several_runs_count_by_mean_and_worst():
