@@ -50,8 +50,9 @@ def command(
     from hil.config.deck import load_deck
     from hil.core.errors import BadInput
     from hil.core.registries import OUTER_LAWS
-    from hil.study.ablation import ablate, parts_of
+    from hil.study.ablation import ablate
     from hil.study.campaign.workers import Pool
+    from hil.study.parts_off import parts_of
     from hil.study.suite import OnSuite, Yardstick, scenarios_of, spread_over
 
     laws = [OUTER_LAWS.get(name).name for name in outers or ("asg-ism",)]
@@ -105,7 +106,8 @@ def _gain_set(path: Path) -> Any:
 def _print(rows: list[Worth], cells: int, repeats: int) -> None:
     from rich.table import Table
 
-    from hil.study.ablation import MEANING, SCORES
+    from hil.study.ablation import SCORES
+    from hil.study.parts_off import MEANING
 
     table = Table(title=f"score without the part - score with it; {cells} cells x {repeats}")
     for head in ("law", "part", "what is off", *SCORES, "failed"):

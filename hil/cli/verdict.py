@@ -68,8 +68,8 @@ def command(
     from hil.record.manifest import command_line, git_revision
     from hil.runs.execute import new_folder
     from hil.study import verdict_page
-    from hil.study.ablation import parts_of
     from hil.study.campaign.workers import Pool
+    from hil.study.parts_off import parts_of
     from hil.study.suite import OnSuite
     from hil.study.verdict import SHORT, Field, VerdictPlan, verdict_data
 

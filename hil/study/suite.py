@@ -17,13 +17,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hil.config.deck import CALM, Cell, Deck
 from hil.core.errors import BadInput
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import BUILT_IN
+from hil.study.parts_off import run_without
 
 if TYPE_CHECKING:
     from hil.config.gains import Gains
@@ -74,8 +74,6 @@ class OnSuite:
 
     def __call__(self, job: Job) -> Figures:
         """Return the figures of one run."""
-        from hil.study.ablation import run_without  # noqa: PLC0415 - each needs the other's names
-
         scenario = with_gains(self.scenarios[job.cell], job.gains)
         values = run_without(scenario, job.outer, job.seed, job.without)
         return {name: values[name] for name in KEPT} if values else {}
@@ -220,8 +218,3 @@ def refuse_seen(judged: Sequence[Cell], seen: Sequence[Cell]) -> None:
 def laws_in_the_field() -> list[str]:
     """Return every built-in outer law that declares what of it is searched."""
     return [law.name for law in OUTER_LAWS.entries() if law.search and law.origin == BUILT_IN]
-
-
-def run_folder() -> Path:
-    """Return the folder of a run that leaves no record."""
-    return Path()

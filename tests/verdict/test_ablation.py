@@ -13,7 +13,8 @@ from hil.control.laws.parts import WithoutFeedForward, WithoutGamma, WithoutKapp
 from hil.core.errors import BadInput
 from hil.core.registries import OUTER_LAWS
 from hil.core.types import ReferenceState
-from hil.study.ablation import ablate, parts_of, run_without
+from hil.study.ablation import ablate
+from hil.study.parts_off import parts_of, run_without
 from hil.study.suite import KEPT, Job, Yardstick
 
 
