@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hil.config.control import ControlConfig, OuterLimits
+from hil.config.load import with_overrides
 from hil.control.laws.hold import HoldAtGoal
 from hil.control.laws.parts import (
     WithoutFeedForward,
@@ -15,7 +17,7 @@ from hil.control.laws.parts import (
     replace_block,
 )
 from hil.core.errors import BadInput
-from hil.core.registries import OUTER_LAWS
+from hil.core.registries import ESTIMATORS, OUTER_LAWS
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
@@ -33,7 +35,10 @@ _BY_LIMIT: Mapping[str, Mapping[str, float | None]] = {
     "restrictions": {"approach_speed_m_s": None, "approach_accel_m_s2": None},
     "lead": {"lead_s": 0.0},
     "hold": {"hold_enter_m": 0.0},
+    "turn-first": {"turn_missing_rad_s": None},
 }
+# Off as things ship: here the part is switched on, and what is below 0 helps.
+_BY_ESTIMATOR = {"observed-z3": "observed-acceleration"}
 MEANING = {
     "alpha": "gain of the sliding term at 0",
     "psi": "averaged sub-gradient Psi at 0 (sigma = 0)",
@@ -45,6 +50,8 @@ MEANING = {
     "restrictions": "no bound on what position and velocity error ask for",
     "lead": "set-points without their lead",
     "hold": "no rest at the goal",
+    "turn-first": "speed is not given up for a turn that is missing",
+    "observed-z3": "z3 observed, not from the law's own zeta: switched on",
 }
 
 
@@ -54,7 +61,11 @@ def parts_of(law: str) -> list[str]:
     fields = entry.settings.model_fields if entry.settings is not None else {}
     own = [part for part, gain in _BY_GAIN.items() if gain in fields and _may_be_zero(entry, gain)]
     blocks = list(_BY_BLOCK) if _stands_on_block(entry) else []
-    return [*own, *blocks, "feed-forward", *_BY_LIMIT]
+    limits = [
+        part for part, table in _BY_LIMIT.items() if set(table) <= set(OuterLimits.model_fields)
+    ]
+    on = [part for part, name in _BY_ESTIMATOR.items() if name in ESTIMATORS.names()]
+    return [*own, *blocks, "feed-forward", *limits, *on]
 
 
 def _may_be_zero(entry: Entry, gain: str) -> bool:
@@ -64,8 +75,6 @@ def _may_be_zero(entry: Entry, gain: str) -> bool:
 
 
 def _stands_on_block(entry: Entry) -> bool:
-    from hil.config.control import ControlConfig  # noqa: PLC0415 - a default set of gains is enough
-
     control = ControlConfig()
     gains = control.active_gains.of(entry)
     try:
@@ -107,6 +116,8 @@ def _changed(scenario: Scenario, outer: str, without: str) -> Scenario:
         return scenario.model_copy(
             update={"control": control.model_copy(update={"limits": limits})}
         )
+    if without in _BY_ESTIMATOR:
+        return with_overrides(scenario, [f"control.estimator={_BY_ESTIMATOR[without]}"])
     if without in _BY_GAIN:
         name = control.gain_set
         gains = control.active_gains.with_values(OUTER_LAWS.get(outer), {_BY_GAIN[without]: 0.0})
