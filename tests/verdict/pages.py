@@ -1,0 +1,65 @@
+"""Put what the verdict's data say into README and docs: `python -m tests.verdict.pages`, after a new verdict.
+
+Between the marks <!-- verdict --> and <!-- /verdict --> (and ablation) the pages hold what is made here.
+"""
+
+import json
+import re
+from pathlib import Path
+
+from hil.study import verdict_words as words
+from hil.study.verdict import shipped_text
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def budget(data):
+    """Return in words what every law was given."""
+    plan, laws = data["plan"], data["laws"]
+    seeds = ", ".join(map(str, plan["search_seeds"]))
+    return (
+        f"Budget of the data: {len(laws)} laws, {plan['candidates']} candidates a law in "
+        f"{len(data['search_cells'])} cells, seeds of the search {seeds}; judged in "
+        f"{len(data['unseen_cells'])} unseen cells."
+    )
+
+
+def block(data):
+    """Return the verdict as the pages have it."""
+    others = words.other_rankings(data)
+    ranked = (
+        f"Another law is first on: {', '.join(others)}."
+        if others
+        else "Every unseen task has the same law first at a calm of 1."
+    )
+    parts = [
+        f"**{words.first_line(data)}**",
+        budget(data),
+        "\n".join(words.readme_table(data)),
+        ranked,
+    ]
+    return "\n\n".join(parts)
+
+
+def filled(text, name, content):
+    """Return a page with what stands between the marks of `name` replaced."""
+    marks = f"<!-- {name} -->", f"<!-- /{name} -->"
+    pattern = re.compile(f"{marks[0]}.*?{marks[1]}", re.S)
+    assert pattern.search(text), f"no mark {marks[0]}"
+    return pattern.sub(lambda _match: f"{marks[0]}\n{content}\n{marks[1]}", text)
+
+
+def pages(data):
+    """Return each page's text as it should be."""
+    found = {}
+    for name in ("README.md", "docs/verdict.md"):
+        text = filled((ROOT / name).read_text(encoding="utf-8"), "verdict", block(data))
+        if name == "docs/verdict.md":
+            text = filled(text, "ablation", "\n".join(words.ablation_table(data)))
+        found[name] = text
+    return found
+
+
+if __name__ == "__main__":
+    for page, made in pages(json.loads(shipped_text())).items():
+        (ROOT / page).write_text(made, encoding="utf-8")
