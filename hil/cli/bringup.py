@@ -32,17 +32,22 @@ _SEEN = "[lf] left forward, [lb] left backward, [rf] right forward, [rb] right b
               help="Write the measured robot file, laid over the believed one.")  # fmt: skip
 @click.option("--turns", type=click.FloatRange(0.0, 100.0), default=10.0, show_default=True,
               help="Wheel turns for the count of the encoders; 0 leaves it out.")  # fmt: skip
+@click.option("--floor", is_flag=True, help="The robot stands on its floor with half a metre free "
+              "around it: measure whether it turns there, and nothing else.")  # fmt: skip
 @click.option("--yes", is_flag=True, help="The wheels are off the ground and nobody looks at "
               "them: no questions, directions stay unseen.")  # fmt: skip
 @json_option
 def command(
-    target: str, robot: str, out: Path | None, turns: float, yes: bool, as_json: bool
+    target: str, robot: str, out: Path | None, turns: float, floor: bool, yes: bool, as_json: bool
 ) -> int:
     """Check a rig whose wheels are OFF THE GROUND, and measure the robot.
 
     Link, identity, battery; each side alone, slowly: motor, encoder, left and right; then dead zone
     and top speed, forward and backward; then counts a turn. Status 1 when a check fails. The wheels
     stand whenever a question is asked, and at the end.
+
+    With --floor the robot stands where it will drive, and turns on the spot to either side instead: how
+    much duty a turn takes there, and how fast it is at full duty.
     """
     from hil.config.load import load_robot
     from hil.rigs.opening import SIMULATED
@@ -57,11 +62,15 @@ def command(
     believed = load_robot(robot)
     device, baud = parse_target(target)
     if out is not None:
+        if floor:
+            raise BadInput(
+                "--out: --floor measures nothing of the robot's file; leave one of them out"
+            )
         check_out(out, robot)
     _require_port(device)
     if not yes:
-        _confirm()
-    report = _run(device, baud, believed, 0.0 if yes else turns, yes)
+        _confirm(floor)
+    report = _run(device, baud, believed, 0.0 if yes else turns, yes, floor)
     if as_json:
         print_json({"target": target, **report.to_json()})
     else:
@@ -83,14 +92,17 @@ def _require_port(device: str) -> None:
         raise RigFault(f"port {device}: no such port; `hil doctor` lists the ports")
 
 
-def _run(device: str, baud: int, believed: RobotConfig, turns: float, yes: bool) -> Report:
+def _run(
+    device: str, baud: int, believed: RobotConfig, turns: float, yes: bool, floor: bool
+) -> Report:
     from hil.config.control import OuterLimits
     from hil.rigs.serial import SerialRig
     from hil.tools.bringup.procedure import BringUp, Plan
 
     limits = OuterLimits()
     rim_m_s = limits.eta1_max_m_s + limits.theta_dot_max_rad_s * believed.track_m / 2.0
-    plan = Plan(believed, rim_m_s / believed.wheel_radius_m, turns)
+    turn_rad_s = limits.theta_dot_max_rad_s if floor else None
+    plan = Plan(believed, rim_m_s / believed.wheel_radius_m, turns, turn_rad_s)
     rig = SerialRig(device, baud, None)
     try:
         return BringUp(rig, Nobody() if yes else Person(), plan, _tell).run()
@@ -128,8 +140,12 @@ def _told(answer: str) -> str:
     return repr(answer) if answer else "an empty line"
 
 
-def _confirm() -> None:
-    answer = _ask("The wheels will turn, up to full speed. Are ALL of them off the ground? [y/N]")
+def _confirm(floor: bool) -> None:
+    answer = _ask(
+        "The robot will turn on the spot, up to full duty. Is half a metre around it free? [y/N]"
+        if floor
+        else "The wheels will turn, up to full speed. Are ALL of them off the ground? [y/N]"
+    )
     if answer not in {"y", "yes"}:
         click.echo("nothing was moved", err=True)
         sys.exit(2)

@@ -56,6 +56,13 @@ class OuterLimits(Section):
     zeta_start_m_s2: float = quantity(
         "m/s^2", "start of zeta at standstill, where B is singular", 0.1, ge=0, le=5
     )
+    turn_missing_rad_s: float | None = quantity(
+        "rad/s",
+        "turn missing, with a side at its motor's limit, at which forward speed gives way; none: never",
+        1.0,
+        gt=0,
+        le=20,
+    )
     lead_s: float = quantity(
         "s", "lead of set-points; half the wheel lag, as noise grows", 0.03, ge=0, le=0.5
     )

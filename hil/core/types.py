@@ -75,6 +75,8 @@ class Estimate:
 
     `z1`, `z2` are the flat output (2.35) and its rate in world axes. `z3` is given only by an
     estimator that observes acceleration; None means the law forms it from its own zeta.
+    `sides_at_limit` (left, right) is 1 or -1 for a side whose motor gives all it can forward or
+    backward and lacks speed; the harness fills it in from what the board reports.
     """
 
     t_host_s: float
@@ -84,6 +86,7 @@ class Estimate:
     z1_m: Vec2
     z2_m_s: Vec2
     z3_m_s2: Vec2 | None = None
+    sides_at_limit: tuple[int, int] = (0, 0)
 
 
 @dataclass(frozen=True, slots=True)

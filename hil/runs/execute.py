@@ -18,6 +18,7 @@ from hil.config.robot import BUILT_IN_PLANT
 from hil.control.estimators.making import make_estimator
 from hil.control.laws.hold import HoldAtGoal
 from hil.control.laws.making import make_outer_law
+from hil.control.laws.turn_first import TurnFirst
 from hil.control.laws.within import WithinWheelSpeed
 from hil.control.references import make_reference
 from hil.control.task_notes import notes
@@ -260,7 +261,10 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
         camera_clock=CameraClock(scenario.camera.latency_s),
         localiser=make_localiser(scenario.camera),
         estimator=make_estimator(control.estimator, control, vehicle.geometry),
-        law=WithinWheelSpeed(law or make_law(spec), vehicle, wheel_speed_max_rad_s(scenario)),
+        law=TurnFirst(
+            WithinWheelSpeed(law or make_law(spec), vehicle, wheel_speed_max_rad_s(scenario)),
+            control.limits.turn_missing_rad_s,
+        ),
         reference=make_reference(scenario.reference),
         vehicle=vehicle,
         recorder=recorder,

@@ -9,15 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from hil.core.errors import RecordFault, RigFault
 from hil.core.registry import in_one_line
 from hil.core.types import PoseMeasurement
 from hil.record.tick_rows import sample_row
-from hil.runs.plausibility import Plausibility
+from hil.runs.plausibility import DIAGNOSIS, Plausibility
 from hil.runs.supervision import Supervisor
+from hil.runs.wheel_limits import WheelLimits
 from hil.wire import handshake
 from hil.wire.refusal import refused_set_point
 
@@ -111,6 +112,8 @@ class Session:
         self._measurement: PoseMeasurement | None = None
         self._supervisor = Supervisor(scenario.safety, parts.estimator)
         self._plausibility = Plausibility(scenario.safety.reactions, self._note)
+        self._limits = WheelLimits()
+        self._wheels_asked = (0.0, 0.0)
         self._pose_time_s = -math.inf  # of the newest pose believed
         self._seen = self._accepted = False  # since the last tick
         self._camera_restarts = 0
@@ -151,6 +154,8 @@ class Session:
             self._stop()
         with suppress(RecordFault):  # closing the record says so
             self._plausibility.finish()
+            if short := self._limits.verdict():
+                self._note(DIAGNOSIS, short)
             self._note(self.ending.outcome, self.ending.detail)
             self._parts.timeline.start(self._parts.rig.now_s())
 
@@ -228,8 +233,14 @@ class Session:
             if tick == 0:
                 law.reset(reference, estimate)
             command = law.step(reference, estimate, period_s)
-            wheels = self._command_wheels(now_s, command)
+            wheels = self._wheels_asked = self._command_wheels(now_s, command)
             self._plausibility.asked(*wheels)
+            self._limits.take(
+                estimate.sides_at_limit,
+                command.theta_dot_rad_s,
+                estimate.theta_dot_rad_s,
+                period_s,
+            )
             self._plausibility.check_progress(now_s, math.dist(reference.z1_m, estimate.z1_m))
             self._record(now_s, command, wheels, now_s - due_s > _LATE_RATIO * period_s)
             if self._publish is not None:
@@ -369,7 +380,10 @@ class Session:
         if estimate is None:
             raise RigFault("camera: no pose to estimate from")
         self._supervisor.check_estimate(estimate)
-        return estimate
+        link = self._parts.link
+        most_counts = link.info.pwm_top_counts * link.parameters.get("PWM_MAX", 1.0)
+        sides = self._limits.sides(self._report, self._wheels_asked, most_counts)
+        return estimate if sides == (0, 0) else replace(estimate, sides_at_limit=sides)
 
     # -- out -----------------------------------------------------------------------------------
 

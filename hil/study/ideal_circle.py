@@ -145,12 +145,17 @@ def _rk4(
     return _moved(x, d, h_s / 6.0)
 
 
-def _perfect(t_s: float, x: State, d0_m: float) -> Estimate:
-    """Return the true state as the estimate."""
+def _perfect(t_s: float, x: State, d0_m: float, accel_m_s2: float | None = None) -> Estimate:
+    """Return the true state as the estimate; with z3 where the true d eta1/dt is given."""
     c, s = math.cos(x[2]), math.sin(x[2])
     pose = Pose(x[0], x[1], x[2])
     z1 = (x[0] + d0_m * c, x[1] + d0_m * s)
-    return Estimate(t_s, pose, x[3], -x[4] / d0_m, z1, (c * x[3], s * x[3]))
+    w = -x[4] / d0_m
+    z3 = None
+    if accel_m_s2 is not None:
+        across = x[3] * w
+        z3 = (c * accel_m_s2 - s * across, s * accel_m_s2 + c * across)
+    return Estimate(t_s, pose, x[3], w, z1, (c * x[3], s * x[3]), z3)
 
 
 def run_ideal(
@@ -163,19 +168,23 @@ def run_ideal(
     step_s: float = 2e-3,
     disturbances: Disturbances = Disturbances(),
     give_up_m: float = 2.0,
+    observed: bool = False,
 ) -> IdealRun:
     """Run the loop; ends early once |delta1| exceeds `give_up_m` (the loop has diverged).
 
     The law runs and the plant steps at `step_s`. 2e-3 s gives the figures of docs/control.md section 6,
-    which were taken at 1e-4 s, to the digits printed there.
+    which were taken at 1e-4 s, to the digits printed there. With `observed` the law is given z3 as it is,
+    disturbed; else it forms z3 from its own zeta.
     """
     reference = make_reference(reference_config)
     x = start
     run = IdealRun([], [], [], [], [], [], [])
+    zeta = 0.0
     law.reset(reference.at(0.0), _perfect(0.0, x, d0_m))
     for index in range(round(duration_s / step_s)):
         t = index * step_s
-        wanted, estimate = reference.at(t), _perfect(t, x, d0_m)
+        accel = zeta + disturbances.a1_m_s2 * math.sin(disturbances.w1_rad_s * t)
+        wanted, estimate = reference.at(t), _perfect(t, x, d0_m, accel if observed else None)
         trace = law.step(wanted, estimate, step_s).trace
         z1, z1_ref = estimate.z1_m, wanted.z1_m
         delta1 = (z1[0] - z1_ref[0], z1[1] - z1_ref[1])
@@ -189,6 +198,7 @@ def run_ideal(
         if abs(delta1[0]) + abs(delta1[1]) > give_up_m:
             break
         v = (trace["v1_m_s3"], trace["u2_m_s2"])
+        zeta = trace["zeta_m_s2"] + v[0] * step_s
         x = _rk4(x, t, step_s, zeta=trace["zeta_m_s2"], v=v, d0_m=d0_m, xi=disturbances)
     return run
 

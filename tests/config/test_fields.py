@@ -157,11 +157,11 @@ def test_the_built_in_values_come_with_their_sources() -> None:
     missing = [item.key for item in robot if is_number(item) and not item.source]
     assert [key for key in missing if "bring_up" not in key] == []
     gains = [item for (key, _), item in listed.items() if ".asg_ism." in key or ".pid." in key]
-    assert len(gains) == 2 * (11 + 5)
+    assert len(gains) == 2 * (14 + 5)
     numbers = [
         item for item in gains if is_number(item) and not item.key.endswith("zeta_start_m_s2")
     ]
-    assert len(numbers) == 2 * (9 + 4)
+    assert len(numbers) == 2 * (12 + 4)
     assert all(isinstance(item.default, float) for item in numbers)
     thesis_k1 = listed["control.gains.thesis.asg_ism.k1_s", ""]
     assert thesis_k1.source == "not printed; docs/control.md section 6"

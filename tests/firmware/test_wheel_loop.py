@@ -271,3 +271,29 @@ def test_unknown_or_impossible_parameters_are_refused():
         _firmware.WheelLoop({"NO_SUCH": 1.0})
     with pytest.raises(ValueError, match="PWM_MAX"):
         _firmware.WheelLoop({"PWM_MAX": 1.5})
+
+
+def test_kappa_has_no_falling_part_once_mu_stands():
+    """With d mu/dt = 0 it is mu (e + sigma sgn E): k by hand; the falling form would give another."""
+    changes = {"ISM_HOLD": 0.1, "ISM_MU0": 0.1, "ISM_STEP": 60.0, "ISM_EPS0": 0.0}
+    loop = _firmware.WheelLoop(EXACT | changes)
+    for _ in range(60):
+        loop.step_at_speed(1.2, 2.0)  # e = -0.8 for 0.24 s: E and the average fall
+    state = loop.state
+    mu, e, sigma = 1.0 / state.t_mu0_s, -0.8, 0.2
+    kappa = mu * (e - sigma)
+    assert state.gain == pytest.approx(2.0 * (G * (30.0 + abs(kappa)) + 0.02), rel=1e-4)
+    falling = mu * (2.0 * e - sigma - state.s)
+    assert abs(abs(falling) - abs(kappa)) > 5.0  # rad/s^2: what it had been taken for
+
+
+@pytest.mark.parametrize("eps_min", [0.05, 0.3, 0.681, 4.0])
+def test_the_least_layer_is_what_it_is_set_to_where_mu_stands(eps_min):
+    """Defaults of EPS0 and HOLD: mu stands at 1/0.044 s, the layer falls on to ISM_EPSMIN and no further."""
+    loop = _firmware.WheelLoop(ISM | {"ISM_EPSMIN": eps_min, "ISM_STEP": 60.0})
+    layers = []
+    for _ in range(200):
+        loop.step_at_speed(1.9, 2.0)
+        layers.append(loop.state.eps)
+    assert layers[-1] == pytest.approx(eps_min, rel=1e-5)
+    assert all(layer >= eps_min * (1 - 1e-5) for layer in layers)

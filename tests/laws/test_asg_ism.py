@@ -203,3 +203,16 @@ def test_traces_have_the_same_columns(outer):
         "zeta_m_s2", "v1_m_s3", "u2_m_s2", "eps", "in_layer", "saturated",
     ]  # fmt: skip
     assert math.isnan(trace["s_x"]) == (outer == "pid")
+
+
+def test_gain_may_grow_with_the_bound_of_2_9():
+    """Alpha = 0 with gamma0 = 2 is alpha = 4: s stays in the layer; gamma1, gamma2 make it stiffer still."""
+    base = CIRCLE_GAINS.asg_ism
+    bounded = base.model_copy(update={"alpha_m_s3": 0.0, "gamma0_m_s3": 2.0})
+    _, run = circle_run(bounded, Disturbances(), duration_s=8.0)
+    _, same = circle_run(base, Disturbances(), duration_s=8.0)  # alpha = 4 = 2 * 2
+    assert run.s == same.s
+    assert run.s_norm_max_m_s2 <= base.eps_min_m_s2
+    for name in ("gamma1_s3", "gamma2_s2"):
+        _, other = circle_run(base.model_copy(update={name: 1.0}), Disturbances(), duration_s=2.0)
+        assert other.s_norm_max_m_s2 < same.s_norm_max_m_s2

@@ -118,3 +118,27 @@ def test_observer_finds_a_constant_disturbance_and_one_that_it_does_not_see_stay
         found[rate_s] = axis.disturbance
     assert found[6.0] == pytest.approx(0.7, rel=0.01)
     assert found[0.1] < 0.1
+
+
+def thesis_worst_m(p):
+    """Return the worst of the last 10 s of section 8.9 with the gains of table 8.2 and this p."""
+    gains = ControlConfig().gains.thesis.with_values(OUTER_LAWS.get("asg-ism"), {"p": p})
+    law = make_outer_law("asg-ism", gains, CIRCLE_LIMITS, D0_M)
+    return run_ideal(law, CIRCLE, CIRCLE_START, disturbances=PUSHED, duration_s=40.0).worst_m(10.0)
+
+
+def test_the_set_of_the_thesis_holds_on_the_ideal_circle():
+    """As shipped (p = 1) within 10 mm; with epsilon 1 (p = 2) three times as far off or more."""
+    assert ControlConfig().gains.thesis.asg_ism.p == 1.0
+    shipped = thesis_worst_m(1.0)
+    assert shipped < 0.010
+    assert thesis_worst_m(2.0) > 3.0 * shipped
+
+
+@pytest.mark.parametrize(("l0", "l1", "meets"), [(1.1, 1.5, False), (3.0, 3.0, True)])
+def test_the_offered_gains_of_super_twisting_meet_6_15_and_the_usual_ones_do_not(l0, l1, meets):
+    """(6.15) with alpha1 = l0 L, alpha0 = l1 sqrt(L): l0 > 1, l1^2 > 4 (l0 + 1)/(l0 - 1); both work."""
+    assert (l0 > 1.0 and l1 * l1 > 4.0 * (l0 + 1.0) / (l0 - 1.0)) == meets
+    assert worst_m("super-twisting", l0=l0, l1=l1) < 0.5 * worst_m(
+        "super-twisting", **WITHOUT["super-twisting"]
+    )

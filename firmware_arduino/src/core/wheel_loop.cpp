@@ -52,28 +52,40 @@ void restart_sliding(Sliding& sl, const WheelTuning& t, float xb, float xa) {
   sl.eta = -xa - t.mu0_s * xb;
 }
 
-// mu = 1 / (t + mu0), until it stands.
+bool mu_stands(const Sliding& sl, const WheelTuning& t) { return sl.t_mu0_s >= t.mu_hold_s; }
+
+// mu = 1 / (t + mu0), until it stands; the layer's time goes on until its floor is reached.
 void pass_time(Sliding& sl, const WheelTuning& t) {
-  if (sl.t_mu0_s >= t.mu_hold_s) return;
+  if (mu_stands(sl, t)) {
+    if (sl.t_mu0_s < t.eps_until_s) sl.t_mu0_s += TICK_S;
+    return;
+  }
   sl.t_mu0_s += TICK_S;
   sl.mu = 1.0f / sl.t_mu0_s;
 }
 
 // eps(t) with beta = 1/2, whose root is the one power soft float can afford; returns |d eps / dt|.
-float boundary_layer(Sliding& sl, const WheelTuning& t, float mu) {
+float boundary_layer(Sliding& sl, const WheelTuning& t) {
   sl.eps = t.eps_min;
   if (sl.t_mu0_s >= t.eps_until_s) return 0.0f;
-  sl.eps = t.eps0 * mu * sqrtf(mu);
-  return 1.5f * sl.eps * mu;
+  const float inv_t = mu_stands(sl, t) ? 1.0f / sl.t_mu0_s : sl.mu;
+  sl.eps = t.eps0 * inv_t * sqrtf(inv_t);
+  return 1.5f * sl.eps * inv_t;
+}
+
+// What mu and Psi do to s by themselves. While mu falls: mu xb - mu^2 (xa + eta) + mu (sigma sgn xa - Psi),
+// with s put in for the sum it contains. Once mu stands d mu/dt = 0, and only mu (xb + sigma sgn xa) is left.
+float kappa_of(const Sliding& sl, const WheelTuning& t, float xb, float xa) {
+  const float pushed = xb + with_sign(t.sigma, xa);
+  return sl.mu * (mu_stands(sl, t) ? pushed : pushed + xb - sl.s);
 }
 
 // k(t) s / (|s| + eps(t)): (4.12)-(4.16) with the corrections of docs/wheel-loop.md.
 float sliding_control(Sliding& sl, const WheelTuning& t, float xb, float xa, float bound) {
   const float mu = sl.mu;
   sl.s = xb + mu * (xa + sl.eta + sl.average);
-  // mu xb - mu^2 (xa + eta) + mu (sigma sgn xa - Psi), with s put in for the sum it contains
-  const float kappa = mu * (xb + xb + with_sign(t.sigma, xa) - sl.s);
-  const float eps_rate = boundary_layer(sl, t, mu);
+  const float kappa = kappa_of(sl, t, xb, xa);
+  const float eps_rate = boundary_layer(sl, t);
   sl.gain = t.two_g * (bound + fabsf(kappa) + eps_rate) + t.two_k0;
   return sl.gain * sl.s / (fabsf(sl.s) + sl.eps);
 }
@@ -150,8 +162,7 @@ WheelTuning wheel_tuning(const Params& p) {
   t.mu_start = 1.0f / p.ism_mu0_s;
   t.mu_hold_s = fmaxf(p.ism_hold_s, p.ism_mu0_s);
   t.average_max = p.ism_sigma * t.mu_hold_s;
-  // eps(t) stands where mu does, if not before
-  t.eps_min = fmaxf(p.ism_eps_min, p.ism_eps0 * powf(t.mu_hold_s, -1.5f));
+  t.eps_min = p.ism_eps_min;
   t.eps_until_s = powf(p.ism_eps0 / t.eps_min, 2.0f / 3.0f);
   t.two_g = 2.0f * p.ism_g_duty_s2_rad;
   t.two_k0 = 2.0f * p.ism_k0_duty;

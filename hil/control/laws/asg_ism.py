@@ -13,6 +13,7 @@ from pydantic import Field
 
 from hil import control
 from hil.config.base import quantity
+from hil.control.bounds import disturbance_bound
 from hil.control.laws.chain import Chain, ChainState
 from hil.control.laws.stages import START_BOX, Stage, StartGains, backstep, begin
 from hil.control.laws.trace import make_trace
@@ -44,6 +45,11 @@ class AsgIsmGains(StartGains):
     mu0_s: float = quantity("s", "mu = 1/(t + mu0)", gt=0, le=100)
     sigma_m_s2: float = quantity("m/s^2", "scale of the cost H in Psi", ge=0, le=100)
     cost: Cost = "sum"
+    gamma0_m_s3: float = quantity(
+        "m/s^3", "F+ of (2.9), which alpha grows by 2 F+ (4.14)", 0.0, ge=0, le=1e4
+    )
+    gamma1_s3: float = quantity("1/s^3", "F+ per distance of z1 from the goal", 0.0, ge=0, le=1e4)
+    gamma2_s2: float = quantity("1/s^2", "F+ per speed of z1", 0.0, ge=0, le=1e4)
 
 
 # Bounds and start of a search: poles at -1, -2, -3 to begin with, as for every law (inside its layer
@@ -124,6 +130,15 @@ class AsgIsm:
             limits=self._limits,
         )
 
+    def _bound(self, reference: ReferenceState, estimate: Estimate) -> float:
+        """Return F+ (2.9); the norm of the position counts from the goal, so that no origin matters."""
+        gains = self._gains
+        return disturbance_bound(
+            (gains.gamma0_m_s3, gains.gamma1_s3, gains.gamma2_s2),
+            (estimate.z1_m[0] - reference.z1_m[0], estimate.z1_m[1] - reference.z1_m[1]),
+            estimate.z2_m_s,
+        )
+
     def step(self, reference: ReferenceState, estimate: Estimate, dt_s: float) -> OuterCommand:
         """Return the command for the next `dt_s`."""
         gains = self._gains
@@ -133,7 +148,7 @@ class AsgIsm:
         # (8.17), (8.20) corrected, with p = delta4 and q = delta3
         (sx, sy), kappa, psi, _, (eps, _) = self._block.terms(self._t, (d4x, d4y), (d3x, d3y))
         norm = math.hypot(sx, sy)
-        pull = gains.alpha_m_s3 / (norm + eps)
+        pull = (gains.alpha_m_s3 + 2.0 * self._bound(reference, estimate)) / (norm + eps)
         out = self._chain.command(
             (jx - kappa[0] - pull * sx, jy - kappa[1] - pull * sy), state, dt_s
         )  # (8.22) corrected: static, v = B^-1 [...]

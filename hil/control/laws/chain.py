@@ -27,6 +27,7 @@ class ChainState(NamedTuple):
     sin: float
     eta1: float
     w: float
+    limited: bool = False  # a side of the robot stands at its motor's limit
 
 
 class ChainCommand(NamedTuple):
@@ -105,7 +106,7 @@ class Chain:
         if z3 is None:
             lateral = eta1 * w
             z3 = (cos * self.zeta - sin * lateral, sin * self.zeta + cos * lateral)
-        return ChainState(estimate.z2_m_s, z3, cos, sin, eta1, w)
+        return ChainState(estimate.z2_m_s, z3, cos, sin, eta1, w, estimate.sides_at_limit != (0, 0))
 
     def command(self, jerk: Vec2, state: ChainState, dt_s: float) -> ChainCommand:
         """Invert the wanted jerk (world) and integrate it over dt_s to bounded set-points."""
@@ -135,6 +136,7 @@ class Chain:
             or zeta_next != zeta_free
             or eta1 != eta1_free
             or w != w_free
+            or state.limited
         )
         # At the speed limit the robot does not accelerate: zeta says so, else z3 is a fiction.
         self.zeta = 0.0 if eta1 != eta1_free else zeta_next

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 from hil.core.errors import RigFault
-from hil.tools.bringup import measure, verdicts, wiring
+from hil.tools.bringup import floor_turn, measure, verdicts, wiring
 from hil.tools.bringup.drive import BoardStopped, OpenLoop
 from hil.tools.bringup.link_check import check_link
 from hil.tools.bringup.result import SIDES, Check, Measured, Report, Side
@@ -46,10 +46,12 @@ class Plan:
     robot: RobotConfig
     wheel_speed_needed_rad_s: float
     turns: float = 10.0
+    # Turn rate that the laws may ask for, where the robot stands on its floor; None: it is on blocks.
+    floor_turn_rad_s: float | None = None
 
 
 class BringUp:
-    """Runs once over a rig whose wheels are off the ground; `tell` gets each check as it comes."""
+    """Runs once over a rig on blocks, or on its floor where the plan says so; `tell` gets each check."""
 
     def __init__(self, rig: Rig, eye: Eye, plan: Plan, tell: Callable[[Check], None]) -> None:
         self._link = BoardLink(rig.stream)
@@ -59,6 +61,7 @@ class BringUp:
         self._tell = tell
         self._loop = OpenLoop(rig, self._link)
         self._report = Report()
+        self._over_rad_s = math.nan
 
     def run(self) -> Report:
         """Make every check that can be made; raises RigFault when the rig breaks on the way.
@@ -79,7 +82,10 @@ class BringUp:
         if not self._report.passed:
             self._add(Check("wheels", "skipped", "not driven before the above is mended"))
             return self._report
-        self._drive_wheels()
+        self._over_rad_s = self._link.parameters["OVER_W"]
+        self._drive_wheels(
+            self._on_blocks if self._plan.floor_turn_rad_s is None else self._on_floor
+        )
         return self._report
 
     @property
@@ -91,13 +97,10 @@ class BringUp:
             self._report.checks.append(check)
             self._tell(check)
 
-    def _drive_wheels(self) -> None:
-        over_rad_s = self._link.parameters["OVER_W"]
+    def _drive_wheels(self, checks: Callable[[], None]) -> None:
         try:
             self._loop.prepare()
-            sound = self._wiring()
-            self._speeds(sound, over_rad_s)
-            self._turns(sound)
+            checks()
         except BoardStopped as stopped:
             self._add(Check("board", "fail", str(stopped), "docs/debugging.md", "board_stopped"))
         except BaseException:
@@ -106,6 +109,19 @@ class BringUp:
                 self._loop.restore()
             raise
         self._loop.restore()
+
+    def _on_blocks(self) -> None:
+        sound = self._wiring()
+        self._speeds(sound, self._over_rad_s)
+        self._turns(sound)
+
+    def _on_floor(self) -> None:
+        """Turn on the spot either way."""
+        needed_rad_s = self._plan.floor_turn_rad_s or 0.0
+        for sign, name in floor_turn.NAMES.items():
+            self._eye.watch(f"the robot makes a {name} on the spot, up to full duty")
+            found = floor_turn.measure_turn(self._loop, self._plan.robot, sign)
+            self._add(floor_turn.judge(sign, found, needed_rad_s))
 
     def _wiring(self) -> list[Side]:
         """Drive each side alone; return the sides whose motor and encoder are sound."""
