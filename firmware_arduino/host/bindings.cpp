@@ -32,12 +32,26 @@ struct Parameter {
 };
 
 std::vector<Parameter> parameter_table() {
+  using hil::LAST_WHEEL_LAW;
   return {
 #define PARAM(name, field, value, low, high, unit, doc) {name, value, low, high, unit, doc, false},
 #define LIVE_PARAM(name, field, value, low, high, unit, doc) {name, value, low, high, unit, doc, true},
 #include "core/params.def"
 #undef LIVE_PARAM
 #undef PARAM
+  };
+}
+
+struct WheelLawName {
+  std::string name, doc;
+  float value;  // of the parameter LAW
+};
+
+std::vector<WheelLawName> wheel_laws() {
+  return {
+#define WHEEL_LAW(ID, files, name, doc) {name, doc, static_cast<float>(hil::Law::ID)},
+#include "core/laws.def"
+#undef WHEEL_LAW
   };
 }
 
@@ -253,14 +267,14 @@ void bind_wheel(nb::module_& m) {
       .def_ro("saturation", &hil::Wheel::saturation)
       .def_ro("holding", &hil::Wheel::holding)
       .def_ro("pwm", &hil::Wheel::pwm)
-      .def_ro("pid_integral_rad", &hil::Wheel::pid_integral_rad)
-      .def_prop_ro("s", [](const hil::Wheel& w) { return w.sliding.s; })
-      .def_prop_ro("eps", [](const hil::Wheel& w) { return w.sliding.eps; })
-      .def_prop_ro("gain", [](const hil::Wheel& w) { return w.sliding.gain; })
-      .def_prop_ro("integral", [](const hil::Wheel& w) { return w.sliding.integral; })
-      .def_prop_ro("average", [](const hil::Wheel& w) { return w.sliding.average; })
-      .def_prop_ro("eta", [](const hil::Wheel& w) { return w.sliding.eta; })
-      .def_prop_ro("t_mu0_s", [](const hil::Wheel& w) { return w.sliding.t_mu0_s; });
+      .def_prop_ro("pid_integral_rad", [](const hil::Wheel& w) { return w.pid.integral_rad; })
+      .def_prop_ro("s", [](const hil::Wheel& w) { return w.asg_ism.s; })
+      .def_prop_ro("eps", [](const hil::Wheel& w) { return w.asg_ism.eps; })
+      .def_prop_ro("gain", [](const hil::Wheel& w) { return w.asg_ism.gain; })
+      .def_prop_ro("integral", [](const hil::Wheel& w) { return w.asg_ism.integral; })
+      .def_prop_ro("average", [](const hil::Wheel& w) { return w.asg_ism.average; })
+      .def_prop_ro("eta", [](const hil::Wheel& w) { return w.asg_ism.eta; })
+      .def_prop_ro("t_mu0_s", [](const hil::Wheel& w) { return w.asg_ism.t_mu0_s; });
   nb::class_<WheelLoop>(m, "WheelLoop")
       .def(nb::init<const Values&>(), "parameters"_a = Values{})
       .def("retune", &WheelLoop::retune, "parameters"_a)
@@ -307,6 +321,11 @@ void bind_facts(nb::module_& m) {
       .def_ro("doc", &Parameter::doc)
       .def_ro("live", &Parameter::live);
   m.def("parameter_table", &parameter_table);
+  nb::class_<WheelLawName>(m, "WheelLawName")
+      .def_ro("name", &WheelLawName::name)
+      .def_ro("doc", &WheelLawName::doc)
+      .def_ro("value", &WheelLawName::value);
+  m.def("wheel_laws", &wheel_laws);
   m.def("parameter_hash", [](const Values& values) { return hil::params_hash(params_of(values)); },
         "parameters"_a = Values{});
   m.def("dialect_hash", &hil::dialect_hash);

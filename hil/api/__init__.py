@@ -205,10 +205,10 @@ def make_env(
 def _spec(
     scenario: Scenario, outer: Law | None, inner: str, on: str, camera: str | None, seed: int
 ) -> RunSpec:
-    from hil.runs.execute import INNER_LAWS, RunSpec, camera_for  # noqa: PLC0415 - loads the rigs
+    from hil.board.wheel_laws import require_wheel_law  # noqa: PLC0415
+    from hil.runs.execute import RunSpec, camera_for  # noqa: PLC0415 - loads the rigs
 
-    if inner not in INNER_LAWS:
-        raise BadInput(f"inner = {inner!r}: no such wheel law; choose {' or '.join(INNER_LAWS)}")
+    require_wheel_law(inner)
     _check_seed(seed)
     return RunSpec(
         scenario=scenario,

@@ -44,6 +44,20 @@ class Parameter:
 def parameter_table() -> list[Parameter]:
     """Return every parameter of the board in the board's order."""
 
+class WheelLawName:
+    """A wheel law of the board, as laws.def names it."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def doc(self) -> str: ...
+    @property
+    def value(self) -> float:
+        """Value of the parameter LAW."""
+
+def wheel_laws() -> list[WheelLawName]:
+    """Return the wheel laws in the order of their values."""
+
 def parameter_hash(parameters: Mapping[str, float] = ...) -> int:
     """Return the hash of the defaults with `parameters` put over them.
 

@@ -50,11 +50,11 @@ def command(
     much duty a turn takes there, and how fast it is at full duty.
     """
     from hil.config.load import load_robot
-    from hil.rigs.opening import SIMULATED
+    from hil.rigs.opening import is_simulated
     from hil.rigs.serial import parse_target
     from hil.tools.bringup.robot_file import check_out, write_robot_file
 
-    if target in SIMULATED:
+    if is_simulated(target):
         raise BadInput(
             f"--on {target}: bringup needs a port; to try it on the twin, `hil twin serve --set "
             "robot.variant=lifted`, then --on serial:PORT with the port that it names"

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from hil.tools.inventory import Item, Listing
 
 KINDS = (
-    "laws", "wheel-laws", "estimators", "localisers", "references", "scenarios", "robots", "decks",
-    "campaigns", "figures",
+    "laws", "wheel-laws", "estimators", "localisers", "references", "vehicles", "targets",
+    "scenarios", "robots", "decks", "campaigns", "figures",
 )  # fmt: skip
 
 

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from hil.board.wheel_laws import WHEEL_LAWS
+
 if TYPE_CHECKING:
     from rich.console import Console
 
     from hil.config.scenario import Scenario
-INNER_LAWS = click.Choice(["pid", "asg-ism"])
+INNER_LAWS = click.Choice(sorted(WHEEL_LAWS, reverse=True))
 
 target_option = click.option(
     "--on", "target", default="twin", show_default=True, metavar="TARGET",

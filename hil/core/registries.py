@@ -22,6 +22,7 @@ ESTIMATORS = Registry(
 REFERENCES = Registry("reference", "skid_steer_hil.references", "hil.control.references", ("at",))
 LOCALISERS = Registry("localiser", "skid_steer_hil.localisers", "vision.localisers", ("locate",))
 VEHICLES = Registry("vehicle", "skid_steer_hil.vehicles", "hil.control.vehicles")
+TARGETS = Registry("target", "skid_steer_hil.targets", "hil.rigs.targets")
 
 # As `hil list` names them.
 BY_PLURAL = {
@@ -30,6 +31,7 @@ BY_PLURAL = {
     "references": REFERENCES,
     "localisers": LOCALISERS,
     "vehicles": VEHICLES,
+    "targets": TARGETS,
 }
 BY_KIND = {registry.kind: registry for registry in BY_PLURAL.values()}
 

@@ -29,6 +29,7 @@ from hil.record.source import Source, read_source
 from hil.runs.execute import board_parameters
 from hil.wire import dialect
 from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM, FrameReader, FrameWriter
+from hil.wire.messages import is_arming, set_parameter_message
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -326,15 +327,10 @@ def _boot(writer: FrameWriter, parameters: Mapping[str, float], end_us: int) -> 
     return [
         Sent(
             end_us - _BOOT_US + i * TICK_US,
-            writer.encode(
-                dialect.MAVLink_param_set_message(
-                    BOARD_SYSTEM, BOARD_COMPONENT, name.encode(), value,
-                    dialect.MAV_PARAM_TYPE_REAL32,
-                )
-            ),
+            writer.encode(set_parameter_message(name, value)),
         )
         for i, (name, value) in enumerate(parameters.items())
-    ]  # fmt: skip
+    ]
 
 
 def _own_arming(frame: bytes, own: int, writer: FrameWriter) -> bytes:
@@ -342,8 +338,7 @@ def _own_arming(frame: bytes, own: int, writer: FrameWriter) -> bytes:
     if int.from_bytes(frame[7:10], "little") != dialect.MAVLINK_MSG_ID_COMMAND_LONG:
         return frame
     command = decoded(frame)
-    arms = command.command == dialect.MAV_CMD_COMPONENT_ARM_DISARM and command.param1 == 1.0
-    if not arms:
+    if not is_arming(command):
         return frame
     return writer.encode(
         dialect.MAVLink_command_long_message(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from random import Random
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -23,11 +23,12 @@ from hil.board._firmware import PWM_TOP
 from hil.config.mismatch import true_robot
 from hil.core.errors import BadInput
 from hil.core.types import wrap_pi
-from hil.replays.firmware import Sent, Trace, decoded, read_reports, sent_frames
+from hil.replays.firmware import Trace, decoded, read_reports, sent_frames
 from hil.runs.execute import board_parameters
 from hil.wire import dialect
-from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM, FrameWriter
+from hil.wire.framing import FrameWriter
 from hil.wire.identity import board_hashes
+from hil.wire.messages import arming_message, is_arming, set_parameter_message
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -152,7 +153,7 @@ class Rehearsal:
         if not trace.armed.any():
             raise BadInput(f"{source.path}: no wheel report while armed, nothing to fit to")
         self._trace = trace
-        self._sent = _driving(sent_frames(source, arrivals))
+        self._sent = [item for item in sent_frames(source, arrivals) if _drives(item.frame)]
         self._shift_us = int(trace.t_us[np.argmax(trace.armed)]) - _START_US
         self._frames = _seen(source)
         # A first tie of host to board time: the report that came soonest after its tick.
@@ -212,9 +213,12 @@ class Rehearsal:
         kernel.reset(*self.start_pose())
         writer, at_us = FrameWriter(), _PACE_US
         for name, value in self._parameters.items():
-            kernel.receive(at_us, writer.encode(_set_parameter(name, value)))
+            kernel.receive(at_us, writer.encode(set_parameter_message(name, value)))
             at_us += _PACE_US
-        kernel.receive(_START_US - _PACE_US, writer.encode(_arming(self._parameters)))
+        kernel.receive(
+            _START_US - _PACE_US,
+            writer.encode(arming_message(*board_hashes(dict(self._parameters)))),
+        )
         for t_us, frame in self._sent:
             if (target := t_us - self._shift_us) > _START_US - _PACE_US:
                 kernel.receive(target, frame)
@@ -381,35 +385,10 @@ def _tie_us(source: Source, trace: Trace) -> float:
     return float(gaps.max())
 
 
-def _driving(sent: Sequence[Sent]) -> list[Sent]:
-    """Return the frames that move the robot: set-points, disarming and stop."""
-
-    def drives(frame: bytes) -> bool:
-        msg_id = int.from_bytes(frame[7:10], "little")
-        if msg_id == dialect.MAVLINK_MSG_ID_WHEEL_SETPOINT:
-            return True
-        if msg_id != dialect.MAVLINK_MSG_ID_COMMAND_LONG:
-            return False
-        command = decoded(frame)
-        arms = command.command == dialect.MAV_CMD_COMPONENT_ARM_DISARM and command.param1 == 1.0
-        return not arms and command.command != dialect.MAV_CMD_REQUEST_MESSAGE
-
-    return [item for item in sent if drives(item.frame)]
-
-
-def _set_parameter(name: str, value: float) -> dialect.MAVLink_message:
-    return dialect.MAVLink_param_set_message(
-        BOARD_SYSTEM, BOARD_COMPONENT, name.encode(), value, dialect.MAV_PARAM_TYPE_REAL32
-    )
-
-
-def _arming(parameters: Mapping[str, float]) -> dialect.MAVLink_message:
-    dialect_hash, parameter_hash = board_hashes(dict(parameters))
-    (d_high, d_low), (p_high, p_low) = (
-        divmod(dialect_hash, 1 << 16),
-        divmod(parameter_hash, 1 << 16),
-    )
-    return dialect.MAVLink_command_long_message(
-        BOARD_SYSTEM, BOARD_COMPONENT, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0,
-        1.0, 0.0, float(d_high), float(d_low), float(p_high), float(p_low), 0.0,
-    )  # fmt: skip
+def _drives(frame: bytes) -> bool:
+    """Say whether a frame moves the robot or stops it: set-points, disarming and stop."""
+    msg_id = int.from_bytes(frame[7:10], "little")
+    if msg_id != dialect.MAVLINK_MSG_ID_COMMAND_LONG:
+        return msg_id == dialect.MAVLINK_MSG_ID_WHEEL_SETPOINT
+    command = decoded(frame)
+    return not is_arming(command) and command.command != dialect.MAV_CMD_REQUEST_MESSAGE

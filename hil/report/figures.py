@@ -10,7 +10,7 @@ import io
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -84,32 +84,34 @@ class Trace:
 
 
 def traces(entries: Sequence[Entry]) -> list[Trace]:
-    """Return the runs with their colours: each law has its own when there is more than one law.
+    """Return the runs with label and colour: each law has its own when there is more than one law.
 
     Runs of one law then share colour and label, so that a legend has one line for all of them.
     """
     laws = [entry.run.manifest.outer for entry in entries]
-    colours = law_colours(laws, own_colours(entries))
+    colours = law_colours(laws, own_looks(entries, "colour"))
+    called = own_looks(entries, "label")
     by_law = len(colours) > 1
     return [
         Trace(
-            entry.label if laws.count(law) == 1 or not by_law else law,
+            (called.get(law) or law) + (entry.label.removeprefix(law) if alone else ""),
             colours[law] if by_law else index % len(RUNS),
             entry.run.samples,
         )
         for index, (entry, law) in enumerate(zip(entries, laws, strict=True))
+        for alone in [laws.count(law) == 1 or not by_law]
     ]
 
 
-def own_colours(entries: Sequence[Entry]) -> dict[str, str]:
-    """Return the colour of each law as it registered itself: known here, or kept in its record."""
+def own_looks(entries: Sequence[Entry], look: Literal["label", "colour"]) -> dict[str, str]:
+    """Return what each law registered for reports: known here, or kept in its record."""
     kept = {
-        plugin.name: plugin.colour
+        plugin.name: getattr(plugin, look)
         for entry in entries
         for plugin in entry.run.manifest.plugins
         if plugin.kind == OUTER_LAWS.kind
     }
-    return kept | {law.name: law.colour for law in OUTER_LAWS.entries()}
+    return kept | {law.name: getattr(law, look) for law in OUTER_LAWS.entries()}
 
 
 def law_colours(laws: Sequence[str], colours: Mapping[str, str]) -> dict[str, int]:

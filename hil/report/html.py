@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import base64
 import re
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import cv2
 import jinja2
 from markupsafe import Markup
 
@@ -20,6 +18,7 @@ from hil.core.text import visible
 from hil.report import figures as draw
 from hil.report.assumptions import Assumption, assumptions, gain_assumptions
 from hil.report.compare import HEADLINES, Comparison, Entry, best_entry, findings
+from hil.report.photos import photos
 from hil.report.repeats_html import repeats_context
 
 if TYPE_CHECKING:
@@ -32,8 +31,6 @@ _THESIS = {
     "scenario-2": ("8.14", "8.15", "8.16", "8.17"),
     "scenario-3": ("8.18", "8.19", "8.20", ""),
 }
-_PICTURE_WIDTH_PX = 400
-_JPEG_QUALITY = 72
 
 Context = dict[str, Any]
 
@@ -209,7 +206,7 @@ def _part(comparison: Comparison) -> Context:
         "description": comparison.description,
         "warnings": comparison.warnings,
         "figures": _figures(comparison),
-        "photos": _photos(comparison, colours),
+        "photos": photos(comparison, colours),
         "photo_title": f"Photographs{_after(photographs)}",
         "runs": runs,
         "rows": [
@@ -266,34 +263,6 @@ def _figures(comparison: Comparison) -> list[Context]:
         for svg, title, caption in drawn
         if svg is not None
     ]
-
-
-def _photos(comparison: Comparison, colours: Sequence[int]) -> list[Context]:
-    strips = []
-    for entry, colour in zip(comparison.entries, colours, strict=True):
-        moments = entry.run.moments()
-        photos = [
-            {
-                "moment": moment,
-                "time": f"{max(picture.t_s, 0.0):.1f}",
-                "uri": _data_uri(picture.path),
-            }
-            for moment, picture in moments.items()
-        ]
-        if photos:
-            strips.append({"label": entry.label, "colour": colour, "photos": photos})
-    return strips
-
-
-def _data_uri(path: Path) -> str:
-    """Return a picture, made small, as a data URI; a file that is no picture becomes empty."""
-    image = cv2.imread(str(path))
-    if image is None:
-        return ""
-    height = round(image.shape[0] * _PICTURE_WIDTH_PX / image.shape[1])
-    small = cv2.resize(image, (_PICTURE_WIDTH_PX, height), interpolation=cv2.INTER_AREA)
-    _, jpeg = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
-    return f"data:image/jpeg;base64,{base64.b64encode(jpeg.tobytes()).decode()}"
 
 
 def _requirements(comparison: Comparison) -> list[Context]:

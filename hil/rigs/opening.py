@@ -2,71 +2,53 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from hil.config.mismatch import true_robot
 from hil.core.errors import BadInput
+from hil.core.registries import TARGETS
+from hil.rigs.asked import Asked
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
+    from hil.core.registry import Entry
     from hil.core.rig import Rig
 
-SIMULATED = ("twin", "pil")
 REPLAY = "replay:"
 
 
 def open_rig(target: str, scenario: Scenario, camera: str, seed: int) -> Rig:
     """Return the rig that `target` names, ready to be talked to; raises BadInput or RigFault."""
-    # Each target's own packages are imported only when it is the one asked for.
-    if target == "twin":
-        from sim_twin.twin import Twin  # noqa: PLC0415
-
-        return Twin(twin_setup(scenario, seed), frame_maker(scenario, camera, seed))
-    if target == "pil":
-        from sim_twin.pil import Pil  # noqa: PLC0415
-
-        return Pil(twin_setup(scenario, seed), frame_maker(scenario, camera, seed))
-    if target.startswith("serial:"):
-        from hil.rigs.frames import open_source  # noqa: PLC0415
-        from hil.rigs.serial import SerialRig, parse_target  # noqa: PLC0415
-
-        device, baud = parse_target(target)
-        return SerialRig(device, baud, open_source(camera, scenario.camera))
-    if target.startswith(REPLAY):
-        from hil.record.source import read_source, recorded_scenario  # noqa: PLC0415
-        from hil.rigs.replay import open_replay, refuse_other_task  # noqa: PLC0415
-
-        source = read_source(Path(target.removeprefix(REPLAY)))
-        recorded = recorded_scenario(source.manifest, source.path)
-        refuse_other_task(scenario, recorded, source.path)
-        return open_replay(source, recorded)
-    raise BadInput(f"target {target!r}: unknown; choose twin, pil, serial:DEV[@BAUD] or replay:RUN")
+    entry = target_entry(target)
+    rig: Rig = entry.factory(Asked(target.partition(":")[2], scenario, camera, seed))
+    return rig
 
 
-def twin_setup(scenario: Scenario, seed: int) -> Any:
-    """Return what the simulated rig is made of."""
-    from hil.core.types import Pose  # noqa: PLC0415
-    from sim_twin.twin import TwinSetup  # noqa: PLC0415
-
-    start = scenario.start
-    return TwinSetup(
-        robot=true_robot(scenario),
-        link=scenario.link,
-        camera=scenario.camera,
-        start=Pose(start.x_m, start.y_m, start.theta_rad),
-        seed=seed,
-        disturbances=scenario.disturbances,
-        faults=scenario.faults,
-    )
+def target_entry(target: str) -> Entry:
+    """Return the entry of a target such as `twin` or `serial:DEV`; raises BadInput."""
+    name, colon, _ = target.partition(":")
+    for entry in TARGETS.entries():
+        if entry.name == name and bool(colon) == (":" in _form(entry)):
+            return entry
+    *others, last = (_form(entry) for entry in sorted(TARGETS.entries(), key=_in_order))
+    raise BadInput(f"target {target!r}: unknown; choose {', '.join(others)} or {last}")
 
 
-def frame_maker(scenario: Scenario, camera: str, seed: int) -> Any:
-    """Return the renderer, or None for `--camera pose`; raises BadInput for anything else."""
-    if camera == "pose":
-        return None
-    if camera != "rendered":
-        raise BadInput(f"camera {camera!r}: a simulated robot is seen by rendered or pose only")
-    from sim_twin.camera_sim import RenderedCamera  # noqa: PLC0415
+def is_simulated(target: str) -> bool:
+    """Say whether a target is simulated: it waits for the host and repeats itself by its seed."""
+    entry = next((e for e in TARGETS.entries() if e.name == target.partition(":")[0]), None)
+    return entry is not None and bool(entry.extra.get("simulated"))
 
-    return RenderedCamera(scenario.camera, seed)
+
+def simulated_targets() -> list[str]:
+    """Return the names of the targets that are simulated."""
+    found = [entry for entry in TARGETS.entries() if entry.extra.get("simulated")]
+    return [entry.name for entry in sorted(found, key=_in_order)]
+
+
+def _form(entry: Entry) -> str:
+    return str(entry.extra.get("form", entry.name))
+
+
+def _in_order(entry: Entry) -> tuple[bool, int]:
+    """Return the order in which targets are named: simulated ones, then as they say themselves."""
+    return not entry.extra.get("simulated"), entry.extra.get("order", 0)

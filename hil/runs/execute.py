@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import cv2
 
 from hil.analysis.metrics import LinkStats
+from hil.board.wheel_laws import WHEEL_LAWS
 from hil.config.fit import check_fit
 from hil.config.limits import check_edges, wheel_speed_max_rad_s
 from hil.config.robot import BUILT_IN_PLANT
@@ -33,7 +34,7 @@ from hil.record.recorder import Recorder
 from hil.record.schema import own_columns
 from hil.record.tape import TapedRig
 from hil.record.timeline import Timeline
-from hil.rigs.opening import REPLAY, SIMULATED, open_rig
+from hil.rigs.opening import REPLAY, is_simulated, open_rig
 from hil.runs.interruption import CtrlC
 from hil.runs.law_guard import GuardedLaw
 from hil.runs.outside import fault_of
@@ -49,9 +50,6 @@ if TYPE_CHECKING:
     from hil.core.types import OuterLaw
     from hil.record.memory import RunSink
     from hil.record.reader import RunRecord
-
-# Value of the board's parameter LAW for each wheel law.
-INNER_LAWS = {"asg-ism": 0.0, "pid": 1.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +90,7 @@ def camera_for(scenario: Scenario, target: str, asked: str | None) -> str:
     """Return the camera asked for, or the target's default one."""
     if target.startswith(REPLAY):
         return "as recorded"
-    return asked or (scenario.camera_source if target in SIMULATED else "0")
+    return asked or (scenario.camera_source if is_simulated(target) else "0")
 
 
 def new_folder(stem: str) -> Path:
@@ -199,7 +197,7 @@ def board_parameters(scenario: Scenario, inner: str) -> dict[str, float]:
     """Return every board parameter as this run needs it; raises BadInput where the board cannot count."""
     parameters = scenario.board | {
         "ENC_COUNTS": float(scenario.robot.encoder_counts_per_turn),
-        "LAW": INNER_LAWS[inner],
+        "LAW": WHEEL_LAWS[inner],
     }
     check_edges(parameters)
     return parameters
@@ -242,7 +240,7 @@ def used_things(spec: RunSpec) -> list[tuple[str, Entry]]:
 def _plant_of(spec: RunSpec) -> list[Plugin]:
     """Return what worked out the robot's motion where the harness did not, for the record."""
     where = spec.scenario.robot.plant
-    if spec.target not in SIMULATED or where == BUILT_IN_PLANT:
+    if not is_simulated(spec.target) or where == BUILT_IN_PLANT:
         return []
     path = Path(where)
     text = None if where.startswith("tcp:") or not path.is_file() else path.read_text("utf-8")

@@ -22,6 +22,7 @@ import numpy as np
 from hil.core.errors import HilError, RigFault
 from hil.core.registry import in_one_line
 from hil.core.types import OuterCommand
+from hil.core.wording import past
 
 if TYPE_CHECKING:
     from hil.config.control import OuterLimits
@@ -81,7 +82,8 @@ class GuardedLaw:
             raise self._fault(f"step returned {name} = {value}")
         if abs(value) > limit * _EXCESS:
             raise self._fault(
-                f"step asked for {name} = {value:g} {unit}, the limit is {limit:g} {unit}"
+                f"step asked for {name} = {past(value, math.copysign(limit, value), '.6g')} {unit}, "
+                f"the limit is {limit:g} {unit}"
             )
 
     def _call(self, what: str, function: Callable[[], Result]) -> Result:

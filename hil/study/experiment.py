@@ -11,6 +11,7 @@ from pathlib import Path
 from random import Random
 from typing import TYPE_CHECKING, Any
 
+from hil.board.wheel_laws import WHEEL_LAWS
 from hil.config.fit import check_fit
 from hil.config.gains import only_gains_of
 from hil.core.errors import BadInput
@@ -20,8 +21,8 @@ from hil.record.manifest import Manifest
 from hil.report.circle import CircleStudy
 from hil.report.compare import compare_runs, refuse_other_task, to_json
 from hil.report.repeats import Repeats, repeats_of
-from hil.rigs.opening import SIMULATED
-from hil.runs.execute import INNER_LAWS, RunSpec, camera_for
+from hil.rigs.opening import is_simulated
+from hil.runs.execute import RunSpec, camera_for
 from hil.study import ideal_circle
 from hil.study.side_by_side import manifest_of, still_to_do
 from hil.study.work_folder import (
@@ -59,7 +60,7 @@ class Conditions:
     @property
     def inners(self) -> tuple[str, ...]:
         """Return the wheel laws."""
-        return tuple(sorted(INNER_LAWS, reverse=True)) if self.inner == "both" else (self.inner,)
+        return tuple(sorted(WHEEL_LAWS, reverse=True)) if self.inner == "both" else (self.inner,)
 
 
 def deck_specs(deck: Deck, conditions: Conditions, folder: Path) -> list[RunSpec]:
@@ -78,7 +79,7 @@ def deck_specs(deck: Deck, conditions: Conditions, folder: Path) -> list[RunSpec
         for law in deck.laws
         for inner in conditions.inners
     ]
-    simulated = conditions.target in SIMULATED
+    simulated = is_simulated(conditions.target)
     rng = Random(f"{conditions.seed} order of runs")
     specs = []
     for seed in range(conditions.seed, conditions.seed + conditions.repeats):

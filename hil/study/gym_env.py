@@ -18,7 +18,7 @@ from hil.core.errors import BadInput, RigFault
 from hil.core.types import OuterCommand, wrap_pi
 from hil.record.memory import MemoryRecorder
 from hil.record.schema import SAMPLE_NAMES
-from hil.rigs.opening import SIMULATED, open_rig
+from hil.rigs.opening import is_simulated, open_rig, simulated_targets
 from hil.runs.execute import RunSpec, board_parameters, link_stats, make_manifest, make_parts
 from hil.runs.session import Ending, Session
 from hil.study.tune import COST_WEIGHTS, run_cost
@@ -108,10 +108,10 @@ class HilEnv(gymnasium.Env["Vector", "Vector"]):
 
     def __init__(self, spec: RunSpec) -> None:
         """Take the run to step; raises BadInput for a target that is not simulated."""
-        if spec.target not in SIMULATED:
+        if not is_simulated(spec.target):
             raise BadInput(
                 f"environment on {spec.target!r}: a real robot does not wait for a learner; "
-                f"choose {' or '.join(SIMULATED)}"
+                f"choose {' or '.join(simulated_targets())}"
             )
         check_fit(spec.scenario)
         limits = spec.scenario.control.limits

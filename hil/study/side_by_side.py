@@ -17,7 +17,7 @@ from hil.core.errors import BadInput, RigFault
 from hil.record import layout
 from hil.record.manifest import Manifest, read_manifest
 from hil.record.reader import altered_files
-from hil.rigs.opening import SIMULATED
+from hil.rigs.opening import is_simulated
 from hil.runs.execute import RunSpec
 from hil.study.work_folder import Terminated, set_aside
 from hil.study.workers import when_parent_is_gone
@@ -85,7 +85,7 @@ def run_all(specs: Sequence[RunSpec], update: Update, workers: int | None = None
     An error in one run ends the others and is raised here. Simulated runs whose worker process is
     killed are done again; on a real rig, or when that does not help, RigFault is raised.
     """
-    simulated = all(spec.target in SIMULATED for spec in specs)
+    simulated = all(is_simulated(spec.target) for spec in specs)
     todo = list(specs)
     for tried in range(_MOST_TRIES):
         if not todo:

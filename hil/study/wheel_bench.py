@@ -17,13 +17,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hil.board import _firmware
+from hil.board.wheel_laws import WHEEL_LAWS, require_wheel_law
 from hil.config.events import Disturbance, Fault, Zone
 from hil.config.load import load_scenario
 from hil.config.mismatch import true_robot
-from hil.core.errors import BadInput, RigFault
+from hil.core.errors import RigFault
 from hil.wire import dialect
-from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM, FrameReader, FrameWriter
+from hil.wire.framing import FrameReader, FrameWriter
 from hil.wire.identity import dialect_hash, parameter_hash
+from hil.wire.messages import arming_message, set_parameter_message
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,7 +37,6 @@ if TYPE_CHECKING:
 
 Speeds = tuple[float, float]
 
-LAWS = {"asg-ism": 0.0, "pid": 1.0}
 # Robots of the bench: as the host believes it, as the default mismatch of 10 % makes it, or, any
 # other number, drawn from the box of that mismatch.
 BELIEVED, DEFAULT = -1, 0
@@ -178,26 +179,9 @@ class _Rig:
     def _bring_up(self, parameters: Mapping[str, float]) -> None:
         self.advance(_BOOT_S)
         for name, value in parameters.items():
-            self._send(
-                dialect.MAVLink_param_set_message(
-                    BOARD_SYSTEM,
-                    BOARD_COMPONENT,
-                    name.encode(),
-                    value,
-                    dialect.MAV_PARAM_TYPE_REAL32,
-                )
-            )
+            self._send(set_parameter_message(name, value))
             self.advance(self.now_s + _FRAME_S)
-        halves = [
-            float(part)
-            for value in (dialect_hash(), parameter_hash({**_defaults(), **parameters}))
-            for part in divmod(value, 1 << 16)
-        ]
-        arm = dialect.MAV_CMD_COMPONENT_ARM_DISARM
-        values = [1.0, 0.0, *halves, 0.0]
-        self._send(
-            dialect.MAVLink_command_long_message(BOARD_SYSTEM, BOARD_COMPONENT, arm, 0, *values)
-        )
+        self._send(arming_message(dialect_hash(), parameter_hash({**_defaults(), **parameters})))
         self.advance(self.now_s + 0.05)
         if self.state != dialect.HIL_STATE_ARMED:
             raise RigFault("wheel bench: the board refuses to arm with these parameters")
@@ -246,9 +230,7 @@ class Trace:
 
 def run(law: str, case: Case, parameters: Mapping[str, float], seed: int = DEFAULT) -> Trace:
     """Run a case with a wheel law; `parameters` go over the board's defaults."""
-    if law not in LAWS:
-        raise BadInput(f"inner law {law!r}: unknown; choose one of {', '.join(LAWS)}")
-    rig = _Rig(case, {**parameters, "LAW": LAWS[law]}, seed)
+    rig = _Rig(case, {**parameters, "LAW": WHEEL_LAWS[require_wheel_law(law)]}, seed)
     left, right = (_state_index(f"omega_{side}_rad_s") for side in ("left", "right"))
     charge = _state_index("charge_ratio")
     charge_start = rig.kernel.state()[charge]
@@ -333,7 +315,7 @@ def table(
     found: dict[str, dict[str, dict[str, float]]] = {}
     for name, case in CASES.items():
         found[name] = {}
-        for law in LAWS:
+        for law in WHEEL_LAWS:
             runs = [figures(case, run(law, case, parameters, seed)) for seed in seeds]
             found[name][law] = {
                 field.name: float(np.mean([getattr(item, field.name) for item in runs]))

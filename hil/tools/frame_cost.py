@@ -12,6 +12,7 @@ from hil.board import _firmware
 from hil.wire import dialect, handshake
 from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM
 from hil.wire.link import BoardLink
+from hil.wire.messages import set_parameter_message
 from sim_twin.pil import Pil
 
 _RATE_HZ = 20
@@ -27,11 +28,7 @@ def _set(name: str, value: float, change: float = 0.0) -> Say:
     """Set a parameter; a `change` makes every second one another value."""
 
     def say(link: BoardLink, count: int) -> None:
-        message = dialect.MAVLink_param_set_message(
-            BOARD_SYSTEM, BOARD_COMPONENT, name.encode(), value + change * (count % 2),
-            dialect.MAV_PARAM_TYPE_REAL32,
-        )  # fmt: skip
-        link.send(message)
+        link.send(set_parameter_message(name, value + change * (count % 2)))
 
     return say
 

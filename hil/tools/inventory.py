@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import Any
 
+from hil.board.wheel_laws import SUMMARIES
 from hil.config.fields import Setting, settings
 from hil.config.load import builtin_names
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME
 from hil.core.files import parse_toml
-from hil.core.registries import BY_PLURAL, ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES
+from hil.core.registries import BY_PLURAL, ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES, VEHICLES
 from hil.core.registry import BUILT_IN, Entry, Registry
-from hil.runs.execute import INNER_LAWS
 
 # Where a scenario has the settings of a thing of a kind.
 _SET_BY = {
@@ -22,6 +22,7 @@ _SET_BY = {
     ESTIMATORS.kind: "control.estimator_settings.",
     LOCALISERS.kind: "camera.localiser_settings.",
     REFERENCES.kind: "reference.",
+    VEHICLES.kind: "robot.vehicle.",
 }
 
 
@@ -103,8 +104,7 @@ def listing(kind: str, from_files: Sequence[str] = ()) -> Listing:
     if from_files:
         raise BadInput(f"{from_files[0]}: {kind} do not come from Python files")
     if kind == "wheel-laws":
-        said = {"asg-ism": "averaged sub-gradient integral sliding mode", "pid": "PID"}
-        items = [Item(name, f"{said.get(name, name)}, on the board") for name in INNER_LAWS]
+        items = [Item(name, f"{said}, on the board") for name, said in SUMMARIES.items()]
     elif kind == "figures":
         items = [Item(m.name, m.definition, unit=m.unit) for m in BY_NAME.values()]
     else:
@@ -129,9 +129,9 @@ def _registered(kind: str, registry: Registry, from_files: Sequence[str]) -> Lis
 def _item(entry: Entry, registry: Registry) -> Item:
     own = entry.settings
     keys = tuple(settings(own)) if own is not None else ()
-    if registry is REFERENCES:
+    if registry in (REFERENCES, VEHICLES):
         keys = tuple(key for key in keys if key.key != "kind")
-    set_by = _SET_BY[registry.kind].format(entry.key)
+    set_by = _SET_BY.get(registry.kind, "").format(entry.key)
     return Item(
         entry.name, entry.summary, entry.origin, keys, entry.search, entry.trace, set_by=set_by
     )

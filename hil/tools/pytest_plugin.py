@@ -154,14 +154,14 @@ def _run(
     set: str | Sequence[str] = (),
 ) -> RunRecord:
     """Run a scenario into `folder`; input that is refused fails the test with its one line."""
+    from hil.board.wheel_laws import require_wheel_law  # noqa: PLC0415
     from hil.config.load import load_scenario  # noqa: PLC0415 - pytest starts without it
-    from hil.core.errors import BadInput, HilError  # noqa: PLC0415
+    from hil.core.errors import HilError  # noqa: PLC0415
     from hil.core.registries import OUTER_LAWS  # noqa: PLC0415
-    from hil.runs.execute import INNER_LAWS, RunSpec, camera_for, execute  # noqa: PLC0415
+    from hil.runs.execute import RunSpec, camera_for, execute  # noqa: PLC0415
 
     try:
-        if inner not in INNER_LAWS:
-            raise BadInput(f"inner law {inner!r}: is none of {', '.join(INNER_LAWS)}")
+        require_wheel_law(inner)
         law = OUTER_LAWS.get(_found(outer, beside)) if outer else None
         overrides = (set,) if isinstance(set, str) else tuple(set)
         resolved = load_scenario(_found(scenario, beside), overrides)

@@ -14,12 +14,14 @@ from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,39}")
 _REGISTRIES = {"law": OUTER_LAWS, "localiser": LOCALISERS, "estimator": ESTIMATORS}
+_IN_PYTHON = (*_REGISTRIES, "plant")
 _ROBOT = "thesis-4wd"
 # What to try first; {0} is the file.
 _TRY = {
     "law": "hil run scenario-1 --outer ./{0}",
     "estimator": "hil run scenario-1 --set control.estimator=./{0}",
     "localiser": "hil run scenario-1 --set camera.localiser=./{0}",
+    "plant": "hil run scenario-1 --set robot.plant=./{0}",
     "scenario": "hil run ./{0}",
     "robot": "hil check robot {0}",
 }
@@ -34,7 +36,7 @@ def write_template(
 
     Raises BadInput for a name that cannot be one or is taken, and for a file that is there.
     """
-    suffix = ".py" if kind in _REGISTRIES else ".toml"
+    suffix = ".py" if kind in _IN_PYTHON else ".toml"
     _check_name(kind, name.removesuffix(suffix), suffix)
     name = name.removesuffix(suffix)
     path = folder / f"{name}{suffix}"
@@ -76,7 +78,7 @@ def _check_name(kind: str, name: str, suffix: str) -> None:
             if taken.replace("-", "_").casefold() == name.replace("-", "_").casefold():
                 origin = registry.get(taken).origin
                 raise BadInput(f"{kind} {name!r}: the name is taken ({origin}); take another one")
-    elif name in builtin_names(f"{kind}s"):
+    elif kind != "plant" and name in builtin_names(f"{kind}s"):
         raise BadInput(f"{kind} {name!r}: the name is taken (built in); take another one")
     if suffix == ".py" and _is_module(name):
         raise BadInput(

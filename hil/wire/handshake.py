@@ -15,6 +15,7 @@ from hil.core.rig import Rig
 from hil.wire import dialect, identity
 from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM
 from hil.wire.link import BoardLink, Procedure, enum_name
+from hil.wire.messages import arming_params, set_parameter_message
 
 # Opening the port of an Arduino resets it; its boot loader holds it for up to 2 s.
 _FIRST_HEARTBEAT_S = 6.0
@@ -119,9 +120,7 @@ def set_parameter(link: BoardLink, name: str, value: float) -> Procedure:
         return
     start_s = link.t_s
     link.parameters[name] = math.nan
-    message = dialect.MAVLink_param_set_message(
-        BOARD_SYSTEM, BOARD_COMPONENT, name.encode(), value, dialect.MAV_PARAM_TYPE_REAL32
-    )
+    message = set_parameter_message(name, value)
     yield from _ask(
         link,
         lambda _: link.send(message),
@@ -144,10 +143,7 @@ def arm(link: BoardLink, dialect_hash: int, parameter_hash: int) -> Procedure:
         link,
         "arm",
         dialect.MAV_CMD_COMPONENT_ARM_DISARM,
-        1.0,
-        0.0,
-        *_halves(dialect_hash),
-        *_halves(parameter_hash),
+        *arming_params(dialect_hash, parameter_hash),
     )
 
 
@@ -225,11 +221,6 @@ def _explanation(link: BoardLink, start_s: float) -> Generator[None, None, str]:
     """Wait for what the board says about a refusal after `start_s`; return it, or nothing."""
     yield from _wait(link, lambda: bool(link.texts) and link.texts[-1].t_host_s > start_s, _TEXT_S)
     return f": {link.texts[-1].text}" if link.texts else ""
-
-
-def _halves(value: int) -> tuple[float, float]:
-    """Return the upper and lower 16 bits of a hash, each exact in a 32-bit float."""
-    return float(value >> 16), float(value & 0xFFFF)
 
 
 def _float32(value: float) -> float:

@@ -17,7 +17,8 @@ from hil.core.errors import RigFault
 from hil.core.rig import ByteStream, discard_unsent
 from hil.core.types import WheelSample
 from hil.wire import dialect
-from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM, FrameReader, FrameWriter
+from hil.wire.framing import FrameReader, FrameWriter
+from hil.wire.messages import command_message
 
 Tap = Callable[[float, bytes], None]
 Procedure = Generator[None, None, None]
@@ -258,12 +259,7 @@ class BoardLink:
 
     def send_command(self, command: int, confirmation: int, *params: float) -> None:
         """Send a COMMAND_LONG; parameters not given are 0."""
-        seven = (*params, *(0.0,) * (7 - len(params)))
-        self.send(
-            dialect.MAVLink_command_long_message(
-                BOARD_SYSTEM, BOARD_COMPONENT, command, confirmation, *seven
-            )
-        )
+        self.send(command_message(command, *params, confirmation=confirmation))
 
     def _run_timers(self, t_s: float) -> None:
         if t_s >= self._heartbeat_due_s:

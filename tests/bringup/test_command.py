@@ -17,6 +17,8 @@ from hil.tools.bringup.wiring import Seen
 from hil.tools.serve_twin import TwinServer
 from tests.bringup.rigs import SPEEDS, lifted
 
+pytestmark = pytest.mark.realtime
+
 
 @pytest.fixture
 def served(tmp_path):

@@ -14,6 +14,8 @@ from hil.rigs.frames import open_source
 from vision import cv_compat
 from vision.sources import CameraControls, ImageFolder, LiveCamera, VideoFile
 
+pytestmark = pytest.mark.realtime
+
 PERIOD_S = 0.02
 
 

@@ -21,6 +21,8 @@ from hil.replays.exact import replay
 from hil.runs.execute import RunSpec, execute, exit_status
 from tests.ends import drawn
 
+pytestmark = pytest.mark.realtime
+
 HIL = [sys.executable, "-m", "hil"]
 
 

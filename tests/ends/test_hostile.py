@@ -24,6 +24,8 @@ from hil.report.html import render
 from hil.runs.execute import RunSpec, execute
 from hil.tools.serve_folder import default_names, user_folder
 
+pytestmark = pytest.mark.realtime
+
 HIL = [sys.executable, "-m", "hil"]
 FORMULA = '=HYPERLINK("http://x","y")'
 MARKUP = "[red]x[/red]<script>alert(1)</script>"

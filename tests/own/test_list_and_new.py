@@ -139,6 +139,37 @@ def test_new_scenario_with_a_new_robot_runs_at_once(tmp_path: Path, monkeypatch)
     assert "only a scenario" in command("new", "law", "x-law", "--robot", "r.toml").err
 
 
+def test_new_plant_drives_the_twin(tmp_path: Path, monkeypatch):
+    """As it is written, and what it answers counts: turned about, the robot does not arrive."""
+    monkeypatch.chdir(tmp_path)
+    assert command("new", "plant", "own-plant").status == 0
+    words = [
+        "run",
+        "scenario-1",
+        "--camera",
+        "pose",
+        "--set",
+        "robot.plant=./own-plant.py",
+        "--json",
+    ]
+    assert command(*words, "--out", "run").status == 0
+    path = tmp_path / "own-plant.py"
+    text = path.read_text()
+    path.write_text(text.replace("(right - left) / self.track", "(left - right) / self.track"))
+    assert path.read_text() != text
+    assert command(*words, "--out", "wrong").status in (1, 3)
+
+
+def test_targets_and_vehicles_are_listed():
+    """Each with where it is from; an unknown target is told with those there are."""
+    listed = command("list", "targets", "--json").json["targets"]["items"]
+    assert {"twin", "pil", "serial", "replay"} <= {item["name"] for item in listed}
+    listed = command("list", "vehicles", "--json").json["vehicles"]["items"]
+    assert {"skid-steer", "differential"} <= {item["name"] for item in listed}
+    refusal = command("run", "scenario-1", "--on", "twim").refusal
+    assert "choose twin, pil, serial:DEV[@BAUD] or replay:RUN" in refusal
+
+
 @pytest.mark.parametrize("kind", ["law", "estimator", "localiser"])
 def test_what_new_writes_passes_the_kit(kind, tmp_path: Path, monkeypatch):
     """The starting points keep every rule of the conformance kit as they are written."""

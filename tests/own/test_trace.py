@@ -12,7 +12,7 @@ from hil.record.reader import read_run
 from hil.record.rrd import blueprint, own_plots, write_rrd
 from hil.record.schema import SAMPLE_NAMES
 from hil.report.compare import compare_runs
-from hil.report.figures import own_colours
+from hil.report.figures import own_looks, traces
 from tests.cli.command import hil, run_pose
 from tests.own.starts import law_text, written
 
@@ -115,4 +115,16 @@ def test_colour_of_a_law_stands_in_its_record(run: Path):
     (plugin,) = record.manifest.plugins
     assert (plugin.label, plugin.colour) == ("traced-law", "#009e73")
     (entry,) = compare_runs([record], 1).entries
-    assert own_colours([entry])["traced-law"] == "#009e73"
+    assert own_looks([entry], "colour")["traced-law"] == "#009e73"
+
+
+def test_label_of_a_law_stands_in_the_legends(tmp_path: Path):
+    """As it registered itself, and a law without one by its name."""
+    text = law_text("tr-law").replace('"tr-law",', '"tr-law", label="Traced, of Lab 7",')
+    run_pose(
+        "--outer", written(tmp_path / "law.py", text), "--set", "duration_s=0.4", "--out",
+        tmp_path / "own",
+    )  # fmt: skip
+    run_pose("--outer", "pid", "--set", "duration_s=0.4", "--out", tmp_path / "pid")
+    entries = compare_runs([read_run(tmp_path / "own"), read_run(tmp_path / "pid")]).entries
+    assert [trace.label for trace in traces(entries)] == ["Traced, of Lab 7", "pid"]

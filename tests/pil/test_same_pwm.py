@@ -8,7 +8,7 @@ import pytest
 import hil.runs.execute
 from hil.board import _firmware
 from hil.config.load import load_scenario
-from hil.rigs.opening import twin_setup
+from hil.rigs.targets.simulated import twin_setup
 from hil.runs.execute import RunSpec, execute
 from hil.wire.framing import HOST_SYSTEM, FrameReader
 from sim_twin.pil import Pil
@@ -54,11 +54,23 @@ def feed_to_host_build(snapshots, frames, miscount=0):
 
     A frame is given to the host build before the first tick that the ELF had counted it in.
     """
-    _, inputs, left, right, received, setpoint_us = board_size_and(
+    _, *places = board_size_and(
         "inputs", "wheel[0].pwm", "wheel[1].pwm", "link.received", "setpoint.t_us"
     )
+    received = places[3]
     (heard,) = struct.unpack_from("<H", snapshots[-1], received)
-    waiting = iter(frames[len(frames) - heard :])  # the first ones met a board that was not up yet
+    # What it did not hear came before it was up, or in its last tick: those too early would keep the
+    # host build from arming.
+    for early in range(len(frames) - heard + 1):
+        pairs = side_by_side(snapshots, iter(frames[early:]), places, miscount)
+        if any(pwm != (0, 0) for pwm, _ in pairs):
+            break
+    return pairs
+
+
+def side_by_side(snapshots, waiting, places, miscount):
+    """Return the pairs of `feed_to_host_build` for frames that the ELF heard."""
+    inputs, left, right, received, setpoint_us = places
     host = _firmware.Board()
     pairs = []
     for snapshot, after in pairwise(snapshots):

@@ -16,6 +16,8 @@ from hil.study.side_by_side import run_all
 from hil.study.work_folder import sole_writer
 from tests.studies.commands import hil, stopped
 
+pytestmark = pytest.mark.realtime
+
 DECK = 'scenarios = ["scenario-1"]\nlaws = ["pid", "asg-ism"]\n'
 WORDS = ["experiment", "deck.toml", "--camera", "pose", "--set", "duration_s=0.6", "--out", "e"]
 RUNS = ("scenario-1-pid", "scenario-1-asg-ism")

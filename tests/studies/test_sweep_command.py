@@ -16,6 +16,8 @@ from hil.study.campaign.work import run_campaign
 from hil.study.work_folder import Terminated, sole_writer
 from tests.studies.commands import hil, stopped
 
+pytestmark = pytest.mark.realtime
+
 # The start at 5 m lies outside the fence: every run there is a fault.
 TEXT = """
 scenario = "scenario-1"

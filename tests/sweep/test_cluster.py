@@ -14,6 +14,8 @@ from hil.core.errors import RigFault
 from hil.study.campaign import cluster
 from hil.study.campaign.cluster import on_dask
 
+pytestmark = pytest.mark.realtime
+
 distributed = pytest.importorskip("distributed")
 
 

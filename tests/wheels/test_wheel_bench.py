@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from hil.board.wheel_laws import WHEEL_LAWS
 from hil.cli.bench import command
 from hil.config.events import Fault
 from hil.core.errors import BadInput, RigFault
 from hil.study import wheel_bench, wheel_tune
-from hil.study.wheel_bench import BELIEVED, CASES, DEFAULT, LAWS, Case, Trace, figures, run
+from hil.study.wheel_bench import BELIEVED, CASES, DEFAULT, Case, Trace, figures, run
 
 TICK_S = 0.004
 HELD_OUT = wheel_bench.held_out(1)
@@ -64,7 +65,7 @@ def test_a_wheel_that_never_comes_near_never_settles():
     assert found.steady_error_rad_s == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", WHEEL_LAWS)
 @pytest.mark.parametrize("name", CASES)
 def test_no_case_trips_the_board(name, law):
     """Every case ends armed, with finite figures, on the robot of the default scenarios."""
@@ -76,7 +77,7 @@ def test_no_case_trips_the_board(name, law):
     assert found.energy_j > 0.0
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", WHEEL_LAWS)
 def test_both_laws_hold_the_same_limits(law):
     """PWM_MAX and PWM_SLEW bind both laws alike: 0.5 of duty, 10 / 250 = 0.04 a tick."""
     trace = run(law, CASES["step"], {"PWM_MAX": 0.5, "PWM_SLEW": 10.0})
@@ -85,7 +86,7 @@ def test_both_laws_hold_the_same_limits(law):
     assert np.max(changes) == pytest.approx(0.04, abs=1e-9)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", WHEEL_LAWS)
 def test_without_gain_the_bench_fails(law):
     """Negative control: feed-forward alone neither turns the robot nor holds a load."""
     for name in ("turn", "load step"):
@@ -96,7 +97,7 @@ def test_without_gain_the_bench_fails(law):
         assert math.isinf(without.settling_s)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", WHEEL_LAWS)
 def test_a_wrong_sign_is_stopped_by_the_board(law):
     """Negative control: motor leads exchanged; the loop runs away and the board stops it."""
     reversed_leads = replace(CASES["step"], faults=(Fault(kind="motor_reversed"),))
@@ -105,7 +106,7 @@ def test_a_wrong_sign_is_stopped_by_the_board(law):
     assert wheel_tune.case_cost(law, reversed_leads, {}, DEFAULT) == wheel_tune.COST_FAILED
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", WHEEL_LAWS)
 def test_tuned_beats_the_start_of_the_search_on_a_robot_it_has_not_seen(law):
     """Mean cost over all cases on a drawn robot that was no part of the search."""
     tuned = wheel_tune.bench_cost(law, {}, HELD_OUT)
@@ -164,7 +165,7 @@ def test_command_prints_the_table_as_json():
     assert result.exit_code == 0, result.output
     cases = json.loads(result.output)["cases"]
     assert set(cases) == set(CASES)
-    assert all(set(laws) == set(LAWS) for laws in cases.values())
+    assert all(set(laws) == set(WHEEL_LAWS) for laws in cases.values())
 
 
 def test_tune_is_refused_for_speed_figures():

@@ -20,6 +20,8 @@ from hil.wire import handshake, identity
 from hil.wire.link import BoardLink
 from tests.wire.board_rig import BoardRig
 
+pytestmark = pytest.mark.realtime
+
 DEFAULTS = {entry.name: entry.default for entry in _firmware.parameter_table()}
 IMAGE = np.arange(48 * 64 * 3, dtype=np.uint32).astype(np.uint8).reshape(48, 64, 3)
 SEEN = PoseMeasurement(Pose(0.1, -0.2, 3.0), 0.9, "", 0.001, 0.01, {"gap_px": 3.5})

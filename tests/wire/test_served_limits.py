@@ -21,6 +21,8 @@ from tests.twin.rigs import FAST_LINK, Drive, armed
 from tests.twin.test_twin import twin
 from tests.wire.test_served import FilmedBoard, served
 
+pytestmark = pytest.mark.realtime
+
 SAFE = dialect.HIL_STATE_SAFE
 LINE_BYTES_1_S = 5760
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from hil.config.camera import CameraConfig, TagConfig
 from hil.core.registries import LOCALISERS
 from hil.core.types import Pose, PoseMeasurement, wrap_pi
+from hil.core.wording import past
 from vision import cv_compat
 from vision.camera import CameraModel
 from vision.camera_setup import camera_model
@@ -199,7 +200,8 @@ class TagLocaliser:
             return f"side {outline.side_m * 1e3:.1f} mm, tag has {self._tag.size_m * 1e3:.1f} mm"
         residual_px = outline.residual_m / self._scale_m_px(outline.pose)
         if residual_px > RESIDUAL_MAX_PX:
-            return f"outline off by {residual_px:.2f} px RMS, limit {RESIDUAL_MAX_PX} px"
+            text = past(residual_px, RESIDUAL_MAX_PX, ".2f")
+            return f"outline off by {text} px RMS, limit {RESIDUAL_MAX_PX} px"
         return ""
 
     def _judge(
@@ -216,7 +218,8 @@ class TagLocaliser:
             jumps = [math.hypot(p.x_m - predicted.x_m, p.y_m - predicted.y_m) for p in poses]
             best = int(np.argmin(jumps))
             if jumps[best] > search_radius_m:
-                text = f"jump of {jumps[best] * 1e3:.0f} mm, limit {search_radius_m * 1e3:.0f} mm"
+                jump_mm = past(jumps[best] * 1e3, search_radius_m * 1e3, ".0f")
+                text = f"jump of {jump_mm} mm, limit {search_radius_m * 1e3:.4g} mm"
                 return _not_seen(text, details)
         outline, pose = outlines[best], poses[best]
         if predicted is not None:

@@ -18,6 +18,11 @@ inline bool is_zero(float x) {
 // size * sgn(x), for size >= 0; sgn(0) is 0
 inline float with_sign(float size, float x) { return is_zero(x) ? 0.0f : copysignf(size, x); }
 
+inline float clamp(float x, float limit) {
+  if (x > limit) return limit;
+  return x < -limit ? -limit : x;
+}
+
 }  // namespace hil
 
 #endif

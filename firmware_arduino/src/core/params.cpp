@@ -5,6 +5,7 @@
 
 #include "crc32.h"
 #include "flash.h"
+#include "wheel_laws.h"
 
 namespace hil {
 

@@ -63,8 +63,8 @@ void send_wheel_state(Board& b) {
   m.omega_right_rad_s = right.omega_rad_s;
   m.error_rate_left_rad_s2 = left.error_rate_rad_s2;
   m.error_rate_right_rad_s2 = right.error_rate_rad_s2;
-  m.s_left = left.sliding.s;
-  m.s_right = right.sliding.s;
+  m.s_left = wheel_sliding(left, b.tuning);
+  m.s_right = wheel_sliding(right, b.tuning);
   m.t_setpoint_us = b.setpoint.t_us;
   m.pwm_left_counts = left.pwm;
   m.pwm_right_counts = right.pwm;

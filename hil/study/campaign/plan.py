@@ -15,8 +15,9 @@ from random import Random
 from statistics import NormalDist
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
+from hil.board.wheel_laws import WHEEL_LAWS, require_wheel_law
 from hil.config.base import PlainName, Section
 from hil.config.control import OuterLawName
 from hil.config.gains import only_gains_of
@@ -30,7 +31,18 @@ from hil.core.registries import Sources, adopt_sources, file_sources, source_dig
 Point = dict[str, Any]
 # Share of a normal distribution that has to lie within its bounds: draws outside are drawn again.
 _LEAST_INSIDE = 1e-3
-InnerLawName = Literal["asg-ism", "pid"]
+
+
+def _wheel_law(name: str) -> str:
+    try:
+        return require_wheel_law(name)
+    except BadInput as error:
+        raise ValueError(str(error)) from None
+
+
+InnerLawName = Annotated[
+    str, AfterValidator(_wheel_law), Field(json_schema_extra={"enum": list(WHEEL_LAWS)})
+]
 
 
 # Unlike the figures of a run, every run has it, also one that ended early.

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 
 from hil.core.errors import RigFault
 from hil.core.rig import Rig
+from hil.core.wording import past
 from hil.wire import handshake, identity
 from hil.wire.link import BoardLink, WheelReport
 
@@ -182,7 +183,10 @@ class OpenLoop:
             said = f": {link.texts[-1].text}" if link.texts else ""
             raise BoardStopped(f"board: left ARMED by itself: {link.state_name}{said}")
         if silent_s > _SILENCE_S:
-            raise RigFault(f"link: no wheel report for {silent_s:.2f} s (limit {_SILENCE_S:g} s)")
+            raise RigFault(
+                f"link: no wheel report for {past(silent_s, _SILENCE_S, '.2f')} s "
+                f"(limit {_SILENCE_S:g} s)"
+            )
 
     def _send(self, duty: tuple[float, float]) -> None:
         left, right = (max(-1.0, min(1.0, value)) / _DUTY_S_RAD for value in duty)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from hil.core.wording import past
 from hil.tools.bringup.drive import OpenLoop
 from hil.tools.bringup.result import Check, Measured
 from hil.wire.link import BoardLink
@@ -66,7 +67,8 @@ def _failed(name: str, text: str, fault: str) -> Check:
 
 def _latency(median_s: float, p99_s: float, count: int) -> Check:
     text = (
-        f"round trip {median_s * 1e3:.0f} ms median, {p99_s * 1e3:.0f} ms at 99 % of {count} "
+        f"round trip {past(median_s * 1e3, TRIP_MEDIAN_MAX_S * 1e3, '.0f')} ms median, "
+        f"{past(p99_s * 1e3, TRIP_P99_MAX_S * 1e3, '.0f')} ms at 99 % of {count} "
         f"(limits {TRIP_MEDIAN_MAX_S * 1e3:.0f}, {TRIP_P99_MAX_S * 1e3:.0f})"
     )
     if median_s > TRIP_MEDIAN_MAX_S or p99_s > TRIP_P99_MAX_S:
@@ -76,7 +78,8 @@ def _latency(median_s: float, p99_s: float, count: int) -> Check:
 
 def _loss(up_ratio: float, down_ratio: float) -> Check:
     text = (
-        f"{up_ratio:.1%} of the board's frames, {down_ratio:.1%} of the host's "
+        f"{past(up_ratio, LOSS_MAX_RATIO, '.1%')} of the board's frames, "
+        f"{past(down_ratio, LOSS_MAX_RATIO, '.1%')} of the host's "
         f"(limit {LOSS_MAX_RATIO:.0%})"
     )
     if max(up_ratio, down_ratio) > LOSS_MAX_RATIO:
@@ -87,7 +90,7 @@ def _loss(up_ratio: float, down_ratio: float) -> Check:
 def _tie(sigma_s: float) -> Check:
     if math.isinf(sigma_s):
         return _failed("clock tie", "none: no exchange of times went through", "link_latency")
-    text = f"{sigma_s * 1e3:.2f} ms, 1 sigma (limit {TIE_MAX_S * 1e3:g})"
+    text = f"{past(sigma_s * 1e3, TIE_MAX_S * 1e3, '.2f')} ms, 1 sigma (limit {TIE_MAX_S * 1e3:g})"
     if sigma_s > TIE_MAX_S:
         return _failed("clock tie", text, "link_jitter")
     return Check("clock tie", "ok", text)

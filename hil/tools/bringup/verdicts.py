@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from hil.core.wording import past
 from hil.tools.bringup.measure import SLOW_DUTY, Range
 from hil.tools.bringup.result import SIDES, Check, Side
 
@@ -34,7 +35,7 @@ def battery(volts: float, parameters: Mapping[str, float]) -> Check:
     needed_v = low_v + parameters["BATT_HYST"]
     if low_v == 0.0:
         return Check("battery", "note", f"{volts:.1f} V; the board's check is off (BATT_LOW = 0)")
-    text = f"{volts:.1f} V (at least {needed_v:g} V; the board stops at {low_v:g} V)"
+    text = f"{past(volts, needed_v, '.1f')} V (at least {needed_v:g} V; the board stops at {low_v:g} V)"
     if volts >= needed_v:
         return Check("battery", "ok", text)
     if not volts > _USB_V:
@@ -53,7 +54,8 @@ def dead_zone(sound: Sequence[Side], ahead: Range, back: Range) -> list[Check]:
             text = f"does not start both ways up to {SLOW_DUTY:.0%} duty"
             checks.append(Check(name, "fail", text, "free the gear; check the leads", "stiff"))
             continue
-        text = f"starts at {forward:.1%} duty forward, {backward:.1%} backward"
+        ahead_text, back_text = (past(duty, DEAD_DUTY_MAX, ".1%") for duty in (forward, backward))
+        text = f"starts at {ahead_text} duty forward, {back_text} backward"
         text += f" (limit {DEAD_DUTY_MAX:.0%})"
         if max(forward, backward) > DEAD_DUTY_MAX:
             checks.append(Check(name, "fail", text, "free the gear; charge the battery", "stiff"))
@@ -73,8 +75,9 @@ def top_speed(
     checks = []
     for side in sound:
         forward, backward = (way.top_speed_rad_s[SIDES.index(side)] or 0.0 for way in (ahead, back))
-        text = f"{forward:.1f} rad/s forward, {backward:.1f} backward"
-        text += f" (at least {needed_rad_s:.1f}, on the floor less)"
+        ahead_text, back_text = (past(speed, needed_rad_s, ".1f") for speed in (forward, backward))
+        text = f"{ahead_text} rad/s forward, {back_text} backward"
+        text += f" (at least {needed_rad_s:.3g}, on the floor less)"
         if min(forward, backward) < needed_rad_s:
             remedy = "another gear, a fuller battery, or lower control.limits in the scenario"
             checks.append(Check(f"{side} top speed", "fail", text, remedy, "slow"))
@@ -90,7 +93,8 @@ def _balance(speeds: list[float], over_rad_s: float) -> list[Check]:
     checks = []
     spread = max(abs(speeds[i] - speeds[i + 1]) / max(speeds[i : i + 2]) for i in (0, 2))
     if spread > TOP_SPEED_SPREAD_MAX:
-        text = f"left and right differ by {spread:.0%} (limit {TOP_SPEED_SPREAD_MAX:.0%})"
+        shown = past(spread, TOP_SPEED_SPREAD_MAX, ".0%")
+        text = f"left and right differ by {shown} (limit {TOP_SPEED_SPREAD_MAX:.0%})"
         remedy = "the slower side: a dragging wheel, one motor of two without current"
         checks.append(Check("balance", "fail", text, remedy, "uneven"))
     if max(speeds) > 0.9 * over_rad_s:

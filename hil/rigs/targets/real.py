@@ -1,0 +1,23 @@
+"""The target `serial:DEV[@BAUD]`: a real board on a port, a real camera."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from hil.core.registries import TARGETS
+
+if TYPE_CHECKING:
+    from hil.core.rig import Rig
+    from hil.rigs.asked import Asked
+
+
+@TARGETS.register(
+    "serial", summary="a real board on a port, a real camera", form="serial:DEV[@BAUD]"
+)
+def serial(asked: Asked) -> Rig:
+    """Return the rig on a port; raises BadInput for a name that is none, RigFault without the port."""
+    from hil.rigs.frames import open_source  # noqa: PLC0415 - loads video
+    from hil.rigs.serial import SerialRig, parse_target  # noqa: PLC0415
+
+    device, baud = parse_target(f"serial:{asked.where}")
+    return SerialRig(device, baud, open_source(asked.camera, asked.scenario.camera))

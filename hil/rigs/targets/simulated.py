@@ -1,0 +1,65 @@
+"""The targets `twin` and `pil`: the simulated robot, with the board's core or its own binary."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from hil.config.mismatch import true_robot
+from hil.core.errors import BadInput
+from hil.core.registries import TARGETS
+from hil.core.types import Pose
+
+if TYPE_CHECKING:
+    from hil.config.scenario import Scenario
+    from hil.core.rig import Rig
+    from hil.rigs.asked import Asked
+
+
+@TARGETS.register("twin", summary="the simulated robot and the board's core", simulated=True)
+def twin(asked: Asked) -> Rig:
+    """Return the twin; raises BadInput for a camera that a simulated robot is not seen by."""
+    from sim_twin.twin import Twin  # noqa: PLC0415 - loads the renderer
+
+    return Twin(twin_setup(asked.scenario, asked.seed), _frame_maker(asked))
+
+
+@TARGETS.register(
+    "pil",
+    summary="the simulated robot and the board's own binary under simavr",
+    simulated=True,
+    order=1,
+)
+def pil(asked: Asked) -> Rig:
+    """Return the twin under the board's binary; raises BadInput where its simulator is missing."""
+    from sim_twin.pil import Pil  # noqa: PLC0415 - needs simavr
+
+    return Pil(twin_setup(asked.scenario, asked.seed), _frame_maker(asked))
+
+
+def twin_setup(scenario: Scenario, seed: int) -> Any:
+    """Return what the simulated rig is made of."""
+    from sim_twin.twin import TwinSetup  # noqa: PLC0415
+
+    start = scenario.start
+    return TwinSetup(
+        robot=true_robot(scenario),
+        link=scenario.link,
+        camera=scenario.camera,
+        start=Pose(start.x_m, start.y_m, start.theta_rad),
+        seed=seed,
+        disturbances=scenario.disturbances,
+        faults=scenario.faults,
+    )
+
+
+def _frame_maker(asked: Asked) -> Any:
+    """Return the renderer, or None for `--camera pose`; raises BadInput for anything else."""
+    if asked.camera == "pose":
+        return None
+    if asked.camera != "rendered":
+        raise BadInput(
+            f"camera {asked.camera!r}: a simulated robot is seen by rendered or pose only"
+        )
+    from sim_twin.camera_sim import RenderedCamera  # noqa: PLC0415
+
+    return RenderedCamera(asked.scenario.camera, asked.seed)
