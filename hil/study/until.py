@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Self
 from hil.analysis.multiple import looks, narrow_enough
 from hil.core.errors import BadInput
 from hil.core.figures import require_known
-from hil.rigs.opening import SIMULATED
+from hil.rigs.opening import is_simulated
 
 if TYPE_CHECKING:
     from hil.record.reader import RunRecord
@@ -32,7 +32,7 @@ class Until:
     @classmethod
     def of(cls, figure: str, half_width: float, target: str) -> Self:
         """Return the rule; raises BadInput for an unknown figure or a rig whose order is drawn."""
-        if target not in SIMULATED:
+        if not is_simulated(target):
             raise BadInput(
                 f"--until-interval on {target}: the order of runs on a rig is drawn for a fixed number of "
                 "repeats; give --repeats (`hil power` says how many)"

@@ -17,10 +17,12 @@ def budget(data):
     """Return in words what every law was given."""
     plan, laws = data["plan"], data["laws"]
     seeds = ", ".join(map(str, plan["search_seeds"]))
+    small = plan["candidates"] * len(data["search_cells"]) < 100
+    pilot = " A pilot, far below the command's own budget: no evidence to rely on." if small else ""
     return (
         f"Budget of the data: {len(laws)} laws, {plan['candidates']} candidates a law in "
         f"{len(data['search_cells'])} cells, seeds of the search {seeds}; judged in "
-        f"{len(data['unseen_cells'])} unseen cells."
+        f"{len(data['unseen_cells'])} unseen cells.{pilot}"
     )
 
 
