@@ -95,8 +95,8 @@ def test_nothing_off_is_the_law_itself_and_a_part_off_is_not():
 
 def test_a_part_that_helps_everywhere_is_found_and_one_that_does_nothing_is_not():
     """Made-up runs: without its lead the law is worse in every cell, without its hold it is the same."""
-    cells = [f"task{i} in calm" for i in range(8)]
-    yard = Yardstick({f"task{i}": dict.fromkeys(KEPT, 1.0) for i in range(8)})
+    cells = [f"task{i} in calm" for i in range(12)]
+    yard = Yardstick({f"task{i}": dict.fromkeys(KEPT, 1.0) for i in range(12)})
 
     def make(jobs: list[Job]):
         worse = {"lead": 1.5}
@@ -109,7 +109,7 @@ def test_a_part_that_helps_everywhere_is_found_and_one_that_does_nothing_is_not(
     lead, hold = rows["lead"], rows["hold"]
     assert lead.found["accuracy"]
     assert lead.differences["accuracy"].mean == pytest.approx(0.5 * 1.015)
-    assert lead.differences["accuracy"].pairs == 8  # cells, not runs
+    assert lead.differences["accuracy"].pairs == 12  # cells, not runs
     assert not hold.found["accuracy"]
     assert hold.differences["accuracy"].mean == 0.0
 
