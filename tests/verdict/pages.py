@@ -30,9 +30,9 @@ def block(data):
     """Return the verdict as the pages have it."""
     others = words.other_rankings(data)
     ranked = (
-        f"Another law is first on: {', '.join(others)}."
+        f"At a calm of {words.MAIN_LEVEL:g} another law than over all is first on: {', '.join(others)}."
         if others
-        else "Every unseen task has the same law first at a calm of 1."
+        else f"Every unseen task has the same law first at a calm of {words.MAIN_LEVEL:g}."
     )
     parts = [
         f"**{words.first_line(data)}**",
@@ -41,6 +41,14 @@ def block(data):
         ranked,
     ]
     return "\n\n".join(parts)
+
+
+def ablation_block():
+    """Return the table of `hil ablate` with the gains that ship, and the cells it is of."""
+    found = json.loads((ROOT / "hil/data/ablation.json").read_text(encoding="utf-8"))
+    table = "\n".join(words.ablation_table({"ablation": found["rows"]}))
+    cells = ", ".join(found["cells"])
+    return f"With the gains that ship, in {len(found['cells'])} unseen cells ({cells}):\n\n{table}"
 
 
 def filled(text, name, content):
@@ -57,7 +65,7 @@ def pages(data):
     for name in ("README.md", "docs/verdict.md"):
         text = filled((ROOT / name).read_text(encoding="utf-8"), "verdict", block(data))
         if name == "docs/verdict.md":
-            text = filled(text, "ablation", "\n".join(words.ablation_table(data)))
+            text = filled(text, "ablation", ablation_block())
         found[name] = text
     return found
 
