@@ -42,9 +42,14 @@ class Plant:
     def step(self, h_s: float, duty_left: float, duty_right: float, loads: Sequence[float]) -> None:
         """Take one RK4 step with duty (-1..1) and loads (in the order of LOADS) held."""
     def run(
-        self, steps: int, h_s: float, duty_left: float, duty_right: float, loads: Sequence[float]
+        self,
+        steps: int,
+        h_s: float,
+        duty_left: float,
+        duty_right: float,
+        loads: Sequence[float] | None,
     ) -> None:
-        """Take many such steps."""
+        """Take many such steps; without loads a robot that stands costs a twentieth, same bits."""
     def derivative(
         self, duty_left: float, duty_right: float, loads: Sequence[float]
     ) -> list[float]:
@@ -147,6 +152,117 @@ class Kernel:
     @property
     def true_counts(self) -> tuple[int, int]:
         """Encoder counts of the left and right wheel as a sound encoder would show them."""
+
+# Link, camera timing, drawn poses and the rig about them (rig_bind.cpp). Times are host times in s;
+# `chance` is the state of a random.Random, getstate()[1].
+
+_Span = tuple[float, float]
+
+class Serialiser:
+    """A UART that sends one byte after the other, `byte_s` each."""
+
+    def __init__(self, byte_s: float) -> None: ...
+    def send(self, t_s: float, size: int) -> float:
+        """Return the time at which the last of `size` bytes given at `t_s` has left."""
+
+class Channel:
+    """One direction of the link behind the serial port; chunks arrive in the order they left."""
+
+    cuts: Sequence[_Span]
+    doubles: Sequence[_Span]
+    swaps: Sequence[_Span]
+    def __init__(
+        self,
+        latency_s: float,
+        jitter_s: float,
+        to_good: float,
+        to_bad: float,
+        corruption_ratio: float,
+        chance: Sequence[int],
+    ) -> None: ...
+    def carry(self, t_s: float, data: bytes) -> tuple[float, bytes] | None:
+        """Return arrival time and bytes of a chunk that left at `t_s`; None when it is lost."""
+
+class Shutter:
+    """Draws the exposures one after the other."""
+
+    def __init__(
+        self,
+        period_s: float,
+        exposure_s: float,
+        latency_s: float,
+        jitter_s: float,
+        drop_ratio: float,
+        t_first_s: float,
+        clock_start_s: float,
+        clock_rate: float,
+        most_sigmas: float,
+        chance: Sequence[int],
+    ) -> None: ...
+    def next(self, stalls: Sequence[_Span]) -> tuple[int, float, float, float, float] | None:
+        """Return index, start, end, stamp and arrival of the next frame; stalls in order of start."""
+
+LOCALISER_ERROR: tuple[str, ...]
+
+class DrawnPoses:
+    """What a localiser would say of a pose; `error` in the order of LOCALISER_ERROR."""
+
+    def __init__(
+        self,
+        error: Sequence[float],
+        swapped: bool,
+        shift_m: float,
+        places: Sequence[Sequence[tuple[float, float, float, float]]],
+        chance: Sequence[int],
+    ) -> None: ...
+    def measure(
+        self, x_m: float, y_m: float, theta_rad: float
+    ) -> tuple[float, float, float] | None:
+        """Return the pose seen; None where the localiser misses the robot."""
+
+class Rig:
+    """Kernel, line, radio and camera between two looks of the host; its clock is host time."""
+
+    def __init__(
+        self,
+        kernel: Kernel,
+        start_s: float,
+        baud: int,
+        down: Channel,
+        up: Channel,
+        shutter: Shutter,
+        readout_s: float = 0.0,
+    ) -> None: ...
+    def set_spans(self, stalls: Sequence[_Span], hidden: Sequence[_Span]) -> None:
+        """Set when the camera stalls (in order of start) and the robot is hidden."""
+    @property
+    def down(self) -> Channel:
+        """Way from host to board, for the times of its faults."""
+    @property
+    def up(self) -> Channel:
+        """Way from board to host."""
+    def pose_at(self, t_s: float) -> tuple[float, float, float]:
+        """Return X, Y, theta at a time of the last four seconds."""
+    def now_s(self) -> float:
+        """Return the host clock."""
+    def wait(self, until_s: float, poses: int) -> None:
+        """Move to `until_s`, or to the next arrival before it; raises RuntimeError as Kernel.advance."""
+    def advance(self, until_s: float) -> None:
+        """Run towards the next arrival, the first half of `wait`."""
+    def arrive(self, until_s: float, poses: int) -> bool:
+        """Take what has arrived, the second half; False when there is further to run."""
+    def read(self) -> bytes:
+        """Return what has arrived from the board."""
+    def send(self, data: bytes) -> None:
+        """Give the host's port bytes now."""
+    def discard_unsent(self) -> None:
+        """Forget what the line has not begun to carry."""
+    def take_frame(
+        self,
+    ) -> tuple[int, float, float, tuple[tuple[float, float, float], ...]] | None:
+        """Return index, start and stamp of the oldest frame that has arrived, and the robot's poses."""
+    def truth(self) -> tuple[float, float, float, float, float]:
+        """Return X, Y, theta, eta1 and theta_dot now."""
 
 # The renderer (render_bind.cpp). Lengths in m, sizes in px, colours (blue, green, red).
 
@@ -251,6 +367,8 @@ class Renderer:
     """Draws frames of one scene from one view."""
 
     def __init__(self, view: View, scene: Scene, robot: Robot, seed: int) -> None: ...
+    def reseeded(self, seed: int) -> Renderer:
+        """Return the same scene with the noise of another seed."""
     def make(self, index: int, poses: Sequence[tuple[float, float, float]]) -> NDArray[np.uint8]:
         """Return frame `index`, (height, width, 3) BGR; no poses: the empty scene."""
 

@@ -33,6 +33,11 @@ TEXTURE_PERIOD_M = 2.0  # about; a whole number of tiles
 JOINT_M = 0.004
 JOINT_RATIO = 0.75
 
+# A rolling shutter is drawn in bands of so many rows: 0.2 mm at 0.5 m/s and 30 us a row.
+BAND_ROWS = 16
+BAND_POSES = 5
+ROBOT_REACH_M = 0.3
+
 Map = NDArray[np.float64]
 
 
@@ -42,18 +47,69 @@ class RenderedCamera:
     def __init__(self, camera: CameraConfig, seed: int) -> None:
         self.width_px = camera.width_px
         self.height_px = camera.height_px
-        view = _view(camera)
-        floor_m = np.asarray(_native.floor_map(view))
-        self._renderer = _native.Renderer(view, _scene(camera.scene, floor_m), _robot(camera), seed)
+        self._renderer = _renderer(camera).reseeded(seed)
+        self._camera = camera
 
     def make(self, index: int, poses: Sequence[tuple[float, float, float]]) -> NDArray[np.uint8]:
         """Return frame `index`, (height, width, 3) uint8 BGR.
 
         `poses` are (x_m, y_m, theta_rad) of the robot in world axes, evenly spaced from the start
-        to the end of the exposure (two or more show motion blur); none gives the empty floor.
+        to the end of the exposure (two or more show motion blur); none gives the empty floor. With a
+        rolling shutter that is from the start of the first row's exposure to the end of the last's.
         """
+        if self._camera.line_time_s > 0.0 and len(poses) > 1:
+            return self._rolled(index, np.asarray(poses, np.float64))
         image: NDArray[np.uint8] = self._renderer.make(index, poses)
         return image
+
+    def _rolled(self, index: int, poses: Map) -> NDArray[np.uint8]:
+        """Return a frame put together from bands of rows, each drawn as the robot was then."""
+        camera = self._camera
+        whole_s = camera.exposure_s + camera.line_time_s * (camera.height_px - 1)
+        image: NDArray[np.uint8] | None = None
+        for top in range(0, camera.height_px, BAND_ROWS):
+            row = min(top + 0.5 * (BAND_ROWS - 1), camera.height_px - 1.0)
+            if image is not None and not self._holds_robot(poses, row):
+                continue
+            start_s = row * camera.line_time_s
+            then = np.linspace(start_s, start_s + camera.exposure_s, BAND_POSES) / whole_s
+            at = then * (len(poses) - 1)
+            now = np.column_stack(
+                [np.interp(at, np.arange(len(poses)), column) for column in poses.T]
+            )
+            drawn = self._renderer.make(index, [(float(x), float(y), float(t)) for x, y, t in now])
+            image = drawn.copy() if image is None else image
+            image[top : top + BAND_ROWS] = drawn[top : top + BAND_ROWS]
+        assert image is not None
+        return image
+
+    def _holds_robot(self, poses: Map, row: float) -> bool:
+        """Return whether the robot, or its shade, may be in a band of rows."""
+        corners = ROBOT_REACH_M * np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)])
+        floor = (poses[[0, -1], None, :2] + corners).reshape(-1, 2)
+        points = np.vstack([np.column_stack((floor, np.full(8, z))) for z in (0.0, 0.15)])
+        rows = camera_model(self._camera).project(points)[:, 1]
+        return bool(rows.min() - BAND_ROWS <= row <= rows.max() + BAND_ROWS)
+
+
+# The renderer of the last camera, by its configuration: the next run mostly has the same.
+_kept: dict[str, _native.Renderer] = {}
+
+
+def _renderer(camera: CameraConfig) -> _native.Renderer:
+    """Return a camera's renderer; lines of sight, floor and light take a third of a second.
+
+    None of them depends on the seed, which is 0 here.
+    """
+    key = camera.model_dump_json()
+    found = _kept.get(key)
+    if found is None:
+        view = _view(camera)
+        floor_m = np.asarray(_native.floor_map(view))
+        found = _native.Renderer(view, _scene(camera.scene, floor_m), _robot(camera), 0)
+        _kept.clear()
+        _kept[key] = found
+    return found
 
 
 def _view(camera: CameraConfig) -> _native.View:

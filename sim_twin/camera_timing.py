@@ -15,6 +15,9 @@ from dataclasses import dataclass
 from random import Random
 from typing import TYPE_CHECKING
 
+from sim_twin import _native
+from sim_twin.link_model import state_of
+
 if TYPE_CHECKING:
     from hil.config.camera import CameraConfig
 
@@ -37,53 +40,29 @@ class Exposure:
     arrival_s: float
 
 
-class Shutter:
+class Shutter(_native.Shutter):
     """Draws the exposures one after the other; the same for the same rng and configuration."""
 
     def __init__(self, camera: CameraConfig, rng: Random, t_first_s: float) -> None:
-        self._rng = rng
-        self._period_s = 1.0 / camera.rate_hz
-        self._exposure_s = camera.exposure_s
-        self._latency_s = camera.latency_s - _median_wait_s(camera)
-        self._jitter_s = camera.latency_jitter_s
-        self._drop_ratio = camera.drop_ratio
-        self._t_first_s = t_first_s + self._period_s * rng.random()
-        self._clock_start_s = rng.uniform(10.0, 1000.0)
-        self._index = 0
-        self._last_arrival_s = -math.inf
+        period_s = 1.0 / camera.rate_hz
+        t_first_s += period_s * rng.random()
+        super().__init__(
+            period_s=period_s,
+            exposure_s=camera.exposure_s,
+            latency_s=camera.latency_s - _median_wait_s(camera),
+            jitter_s=camera.latency_jitter_s,
+            drop_ratio=camera.drop_ratio,
+            t_first_s=t_first_s,
+            clock_start_s=rng.uniform(10.0, 1000.0),
+            clock_rate=1.0 + 1e-6 * CLOCK_PPM,
+            most_sigmas=_MOST_SIGMAS,
+            chance=state_of(rng),
+        )
 
-    def next(self, stalls: Sequence[Span] = ()) -> Exposure | None:
+    def expose(self, stalls: Sequence[Span] = ()) -> Exposure | None:
         """Return the next frame that will arrive; None when the camera has stalled for good."""
-        while True:
-            self._skip_stalls(stalls)
-            if self._index < 0:
-                return None
-            exposure = self._expose(self._index)
-            self._index += 1
-            if self._rng.random() >= self._drop_ratio:
-                self._last_arrival_s = exposure.arrival_s
-                return exposure
-            if self._drop_ratio >= 1.0:
-                return None
-
-    def _skip_stalls(self, stalls: Sequence[Span]) -> None:
-        """Move on to the first frame whose exposure starts outside every stall."""
-        for start_s, end_s in sorted(stalls):
-            t_s = self._t_first_s + self._index * self._period_s
-            if start_s <= t_s < end_s:
-                if math.isinf(end_s):
-                    self._index = -1
-                    return
-                self._index = math.ceil((end_s - self._t_first_s) / self._period_s)
-
-    def _expose(self, index: int) -> Exposure:
-        start_s = self._t_first_s + index * self._period_s
-        end_s = start_s + self._exposure_s
-        middle_s = 0.5 * (start_s + end_s)
-        spread = min(max(self._rng.gauss(0.0, 1.0), -_MOST_SIGMAS), _MOST_SIGMAS)
-        arrival_s = middle_s + self._latency_s + self._jitter_s * spread
-        clock_s = self._clock_start_s + (middle_s - self._t_first_s) * (1.0 + 1e-6 * CLOCK_PPM)
-        return Exposure(index, start_s, end_s, clock_s, max(arrival_s, end_s, self._last_arrival_s))
+        found = self.next(sorted(stalls))
+        return None if found is None else Exposure(*found)
 
 
 def _median_wait_s(camera: CameraConfig) -> float:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 from hil.board.build import Build, build, find_toolchain
 from hil.config.link import UART_BAUD
 from hil.core.errors import BadInput
-from sim_twin.twin import FrameMaker, Twin, TwinSetup
+from sim_twin.camera_faults import FrameMaker
+from sim_twin.twin import Twin, TwinSetup
 
 if TYPE_CHECKING:
     from sim_twin import _pil

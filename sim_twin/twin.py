@@ -7,27 +7,25 @@ in `wait`; nothing here reads a real clock. Host time is virtual time + HOST_STA
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from random import Random
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from hil.config.robot import BUILT_IN_PLANT
 from hil.control.vehicles.vehicle import make_vehicle
 from hil.core.errors import BadInput, RigFault
 from hil.core.rig import PORT_BYTES, Frame, LineBacklog, Truth
 from hil.core.types import Pose
-from sim_twin.camera_timing import Exposure, Shutter, Span
-from sim_twin.drawn_poses import DrawnPoses, PoseTuple, load_localiser_error
-from sim_twin.link_model import BITS_PER_BYTE, Channel, Serialiser
+from sim_twin import _native
+from sim_twin.camera_faults import FaultyMaker, FrameMaker, covered_front
+from sim_twin.camera_timing import Shutter, Span
+from sim_twin.drawn_poses import DrawnPoses, load_localiser_error
+from sim_twin.host_faults import HostFaults
+from sim_twin.link_model import Channel
 from sim_twin.outside_plant import PERIOD_US, OutsidePlant
 from sim_twin.setup import make_kernel
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from hil.config.camera import CameraConfig
     from hil.config.events import Disturbance, Fault
     from hil.config.link import LinkConfig
@@ -39,13 +37,8 @@ HOST_START_S = 1000.0
 # Poses handed to the renderer over one exposure, an odd number so that one is at its middle:
 # 0.75 mm apart at 0.5 m/s and 6 ms.
 POSES_PER_EXPOSURE = 5
-
-
-class FrameMaker(Protocol):
-    """Draws frames; see `sim_twin.camera_sim.RenderedCamera`."""
-
-    def make(self, index: int, poses: Sequence[PoseTuple]) -> NDArray[np.uint8]:
-        """Return the image of frame `index`; no poses: the robot is not to be seen."""
+# And over all rows of a rolling shutter: 15 ms more at 30 us a row.
+POSES_PER_READOUT = 17
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,51 +60,28 @@ class TwinStream:
     The port holds PORT_BYTES; a host that sends faster than the line carries meets it full (RigFault).
     """
 
-    def __init__(self, twin: Twin, baud: int, down: Channel, arrived: list[bytes]) -> None:
-        self._twin = twin
-        self._baud = baud
-        self._port = Serialiser(baud)
+    def __init__(self, rig: _native.Rig, baud: int) -> None:
+        self._rig = rig
         self._backlog = LineBacklog(baud)
-        self._unsent: deque[tuple[float, float, bytes]] = deque()  # begins, has left, bytes
-        self._down = down
-        self._arrived = arrived
-
-    def read(self) -> bytes:
-        """Return every byte that has arrived by now, b"" if none."""
-        if not self._arrived:
-            return b""
-        data = b"".join(self._arrived)
-        self._arrived.clear()
-        return data
+        self.read = rig.read  # every byte that has arrived by now, b"" if none
 
     def write(self, data: bytes) -> None:
         """Send the bytes towards the board; raises RigFault when the port is full."""
-        now_s = self._twin.now_s()
         try:
-            self._backlog.write(now_s, len(data))
+            self._backlog.write(self._rig.now_s(), len(data))
         except RigFault as error:
             raise RigFault(f"twin: {error}") from None
-        left_s = self._port.send(now_s, len(data))
-        self._unsent.append((left_s - len(data) * BITS_PER_BYTE / self._baud, left_s, data))
+        self._rig.send(data)
 
     def room_bytes(self) -> int:
         """Return how many bytes `write` takes now."""
-        waiting = self._backlog.waiting_bytes(self._twin.now_s())
+        waiting = self._backlog.waiting_bytes(self._rig.now_s())
         return max(PORT_BYTES - math.ceil(waiting), 0)
 
     def discard_unsent(self) -> None:
         """Forget what the line has not begun to carry."""
-        self._unsent.clear()
+        self._rig.discard_unsent()
         self._backlog.clear()
-        self._port = Serialiser(self._baud)
-
-    def carry(self, until_s: float) -> None:
-        """Hand the radio what begins to leave the port by `until_s`."""
-        while self._unsent and self._unsent[0][0] <= until_s:
-            _, left_s, data = self._unsent.popleft()
-            carried = self._down.carry(left_s, data)
-            if carried is not None:
-                self._twin.deliver_to_board(*carried)
 
 
 class Twin:
@@ -131,23 +101,25 @@ class Twin:
         self._setup = setup
         self._vehicle = make_vehicle(setup.robot)
         self._maker = maker
+        self._pictures = FaultyMaker(maker, setup.faults, lambda: _covered_maker(setup))
+        self._host = HostFaults(setup.faults)
         self._kernel = make_kernel(
             setup.robot, setup.link.baud, rng("kernel"), setup.disturbances, setup.faults, board
         )
         self._kernel.reset(setup.start.x_m, setup.start.y_m, setup.start.theta_rad)
-        self._down = Channel(setup.link, rng("link down"))
-        self._up = Channel(setup.link, rng("link up"))
-        self._arrived: list[bytes] = []
-        self._port = TwinStream(self, setup.link.baud, self._down, self._arrived)
-        self.stream = self._port
+        self._rig = _native.Rig(
+            self._kernel,
+            HOST_START_S,
+            setup.link.baud,
+            down=Channel(setup.link, rng("link down")),
+            up=Channel(setup.link, rng("link up")),
+            shutter=Shutter(setup.camera, rng("shutter"), HOST_START_S),
+            readout_s=setup.camera.line_time_s * (setup.camera.height_px - 1),
+        )
+        self.stream = TwinStream(self._rig, setup.link.baud)
         self._drawn = DrawnPoses(load_localiser_error(), setup.camera, rng("localiser"))
-        self._shutter = Shutter(setup.camera, rng("shutter"), HOST_START_S)
-        self._now_s = HOST_START_S
-        self._uplink: deque[tuple[float, bytes]] = deque()
-        self._exposed: deque[tuple[Exposure, tuple[PoseTuple, ...]]] = deque()
         self._last_frame: Frame | None = None
         self._set_spans(math.inf)
-        self._next_frame = self._shutter.next(self._stalls)
         self._outside = self._open_outside(setup)
         self._outside_told = False
 
@@ -168,113 +140,108 @@ class Twin:
 
     def now_s(self) -> float:
         """Return the virtual host clock."""
-        return self._now_s
+        now_s = self._rig.now_s()
+        return now_s + self._host.step_s(now_s)
+
+    def world_s(self) -> float:
+        """Return the time of everything but the host, whose clock may have stepped."""
+        return self._rig.now_s()
 
     def begin(self, t_start_s: float) -> None:
         """Let timed disturbances and faults count from `t_start_s`."""
+        t_start_s -= self._host.step_s(self._rig.now_s())
         self._kernel.begin(_kernel_us(t_start_s))
         self._set_spans(t_start_s)
 
     def wait(self, until_s: float) -> None:
-        """Move to `until_s`, or to the next arrival of bytes or of a frame before it."""
-        arrived = False
-        while not arrived:
-            frame_s = self._next_frame.arrival_s if self._next_frame else math.inf
-            bytes_s = self._uplink[0][0] if self._uplink else math.inf
-            target_s = min(until_s, frame_s, bytes_s)
-            if not self._advance(target_s):
-                continue
-            self._now_s = max(self._now_s, target_s)
-            arrived = self._take_arrivals() or target_s >= until_s
+        """Move to `until_s`, or to the next arrival of bytes or of a frame before it.
+
+        Farther, where the host's process is kept from running then.
+        """
+        self._move(self._host.world_s(until_s, self._rig.now_s()))
+        runs_s = self._host.runs_at_s(self._rig.now_s())
+        while self._rig.now_s() < runs_s:
+            self._move(runs_s)
+
+    def _move(self, until_s: float) -> None:
+        # Where no image is drawn a frame is the one pose at the middle of its exposure.
+        rolling = self._setup.camera.line_time_s > 0.0
+        drawn = POSES_PER_READOUT if rolling else POSES_PER_EXPOSURE
+        poses = 1 if self._maker is None else drawn
+        try:
+            if self._outside is None:
+                self._rig.wait(until_s, poses)
+                return
+            arrived = False
+            while not arrived:
+                self._rig.advance(until_s)
+                if self._outside.fault and not self._outside_told:
+                    self._outside_told = True  # once: the board must be told to stop after it
+                    raise RigFault(self._outside.fault)
+                arrived = self._rig.arrive(until_s, poses)
+        except RuntimeError as error:
+            raise RigFault(f"twin: {error}; check the robot's parameters") from None
 
     def poll_frame(self) -> Frame | None:
         """Return the oldest frame not yet taken; it is drawn only now."""
-        if not self._exposed:
+        taken = self._rig.take_frame()
+        if taken is None:
             return None
-        exposure, poses = self._exposed.popleft()
-        repeated = any(start_s <= exposure.start_s < end_s for start_s, end_s in self._repeats)
+        index, start_s, t_cam_s, poses = taken
+        repeated = any(begin_s <= start_s < end_s for begin_s, end_s in self._repeats)
         if repeated and self._last_frame is not None:
-            again = replace(self._last_frame, index=exposure.index, t_cam_s=exposure.t_cam_s)
-            self._last_frame = again
+            self._last_frame = replace(self._last_frame, index=index, t_cam_s=t_cam_s)
         elif self._maker is None:
             measured = self._drawn.measure(poses[0] if poses else None)
-            self._last_frame = Frame(exposure.index, exposure.t_cam_s, None, measured)
+            self._last_frame = Frame(index, t_cam_s, None, measured)
         else:
-            image = self._maker.make(exposure.index, poses)
-            self._last_frame = Frame(exposure.index, exposure.t_cam_s, image)
-        return self._last_frame
+            self._last_frame = Frame(index, t_cam_s, self._pictures.make(start_s, index, poses))
+        step_s = sum(
+            size_s for size_s, (begin_s, end_s) in self._stamp_steps if begin_s <= start_s < end_s
+        )
+        if not step_s:
+            return self._last_frame
+        return replace(self._last_frame, t_cam_s=t_cam_s + step_s)
 
     def truth(self) -> Truth:
         """Return the true state now."""
-        state = self._kernel.state()
-        pose = Pose(*self._pose_at(self._now_s))
-        return Truth(pose, state[3], state[5], self._vehicle.flat_output(pose))
+        x_m, y_m, theta_rad, eta1_m_s, theta_dot_rad_s = self._rig.truth()
+        pose = Pose(x_m, y_m, theta_rad)
+        return Truth(pose, eta1_m_s, theta_dot_rad_s, self._vehicle.flat_output(pose))
+
+    def pose_at(self, t_s: float) -> Pose:
+        """Return the true pose at a time of the last four seconds of `world_s`."""
+        return Pose(*self._rig.pose_at(t_s))
 
     def close(self) -> None:
         """End the program that works out the robot's motion, where there is one."""
         if self._outside is not None:
             self._outside.close()
 
-    def deliver_to_board(self, t_s: float, data: bytes) -> None:
-        """Let bytes reach the board's UART at `t_s`; in time order."""
-        self._kernel.receive(_kernel_us(t_s), data)
-
     def _set_spans(self, t_begin_s: float) -> None:
         def spans(kind: str) -> list[Span]:
             return [_span(fault, t_begin_s) for fault in self._setup.faults if fault.kind == kind]
 
-        self._stalls = spans("camera_stall")
-        self._occlusions = spans("camera_occluded")
         self._repeats = spans("camera_repeated")
-        self._down.cuts = self._up.cuts = spans("link_cut")
+        self._stamp_steps = [
+            (fault.step_s, _span(fault, t_begin_s))
+            for fault in self._setup.faults
+            if fault.kind == "camera_clock_step"
+        ]
+        self._rig.set_spans(sorted(spans("camera_stall")), spans("camera_occluded"))
+        both = spans("link_cut")
+        for channel, one in ((self._rig.down, "link_down_cut"), (self._rig.up, "link_up_cut")):
+            channel.cuts = both + spans(one)
+            channel.doubles = spans("link_duplicated")
+            channel.swaps = spans("link_reordered")
+        self._pictures.begin(lambda fault: _span(fault, t_begin_s))
+        self._host.begin(lambda fault: _span(fault, t_begin_s))
 
-    def _advance(self, target_s: float) -> bool:
-        """Run towards `target_s`; False when the board has sent bytes on the way."""
-        target_us = _kernel_us(target_s)
-        self._port.carry(target_s)
-        try:
-            reached_us = self._kernel.advance(target_us)
-        except RuntimeError as error:
-            raise RigFault(f"twin: {error}; check the robot's parameters") from None
-        if self._outside is not None and self._outside.fault and not self._outside_told:
-            self._outside_told = True  # once: the board must be told to stop after it
-            raise RigFault(self._outside.fault)
-        for t_us, data in self._kernel.take_sent():
-            carried = self._up.carry(HOST_START_S + 1e-6 * t_us, data)
-            if carried is not None:
-                self._uplink.append(carried)
-        return reached_us >= target_us
 
-    def _take_arrivals(self) -> bool:
-        """Move what has arrived by now to where the host reads; True when there was any."""
-        arrived = False
-        while self._uplink and self._uplink[0][0] <= self._now_s:
-            self._arrived.append(self._uplink.popleft()[1])
-            arrived = True
-        while self._next_frame and self._next_frame.arrival_s <= self._now_s:
-            self._exposed.append((self._next_frame, self._poses_over(self._next_frame)))
-            self._next_frame = self._shutter.next(self._stalls)
-            arrived = True
-        return arrived
+def _covered_maker(setup: TwinSetup) -> FrameMaker:
+    from sim_twin.camera_sim import RenderedCamera  # noqa: PLC0415 - only where pictures are drawn
 
-    def _pose_at(self, t_s: float) -> PoseTuple:
-        t_us = 1e6 * (t_s - HOST_START_S)
-        return self._kernel.pose_at(min(max(t_us, 0.0), self._kernel.time_us))
-
-    def _poses_over(self, exposure: Exposure) -> tuple[PoseTuple, ...]:
-        """Return the robot's poses from start to end of the exposure; none while it is hidden.
-
-        Where no image is drawn it is the one pose at the middle.
-        """
-        for start_s, end_s in self._occlusions:
-            if start_s <= exposure.start_s < end_s:
-                return ()
-        if self._maker is None:
-            return (self._pose_at(0.5 * (exposure.start_s + exposure.end_s)),)
-        step_s = (exposure.end_s - exposure.start_s) / (POSES_PER_EXPOSURE - 1)
-        return tuple(
-            self._pose_at(exposure.start_s + i * step_s) for i in range(POSES_PER_EXPOSURE)
-        )
+    return RenderedCamera(covered_front(setup.camera), setup.seed)
 
 
 def _kernel_us(t_s: float) -> int:

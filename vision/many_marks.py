@@ -31,6 +31,7 @@ TURNED_RAD = 0.6
 
 Point = tuple[float, float]
 Image = NDArray[np.uint8]
+Covariance = tuple[float, float, float, float, float, float]
 Find = tuple[tuple[int, int], PoseMeasurement]  # numbers of two marks, and what they gave
 
 
@@ -137,6 +138,7 @@ class ManyMarks:
             best,
             pose=pose,
             sigma_xy_m=math.hypot(best.sigma_xy_m, residual_m),
+            covariance=_widened(best.covariance, residual_m),
             details=details,
         )
 
@@ -146,6 +148,14 @@ class ManyMarks:
         x, y = self._places[mark]
         c, s = math.cos(seen.pose.theta_rad), math.sin(seen.pose.theta_rad)
         return seen.pose.x_m + c * x - s * y, seen.pose.y_m + s * x + c * y
+
+
+def _widened(covariance: Covariance | None, residual_m: float) -> Covariance | None:
+    """Return a claim (xx, xy, xt, yy, yt, tt) to which what the marks disagree by is added."""
+    if covariance is None:
+        return None
+    xx, xy, xt, yy, yt, tt = covariance
+    return xx + residual_m**2, xy, xt, yy + residual_m**2, yt, tt
 
 
 def _two(one: MarkConfig, other: MarkConfig) -> dict[str, object]:

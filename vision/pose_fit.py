@@ -7,9 +7,11 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hil.core.types import Pose
+from hil.core.types import Pose, wrap_pi
 
 Array = NDArray[np.float64]
+
+WEIGHTED_STEPS = 2  # of Gauss and Newton from the unweighted pose
 
 
 def fit_pose(body_m: ArrayLike, world_m: ArrayLike) -> tuple[Pose, float]:
@@ -28,3 +30,33 @@ def fit_pose(body_m: ArrayLike, world_m: ArrayLike) -> tuple[Pose, float]:
     x, y = w0 - turn @ b0
     rms = float(np.sqrt(np.mean(np.sum((b @ turn.T - w) ** 2, axis=1))))
     return Pose(float(x), float(y), theta), rms
+
+
+def weighted_pose(
+    body_m: ArrayLike, world_m: ArrayLike, covariances_m2: ArrayLike
+) -> tuple[Pose, Array, float]:
+    """Return the pose that takes body points, (N, 2), to world points of known covariance.
+
+    `covariances_m2` is (N, 2, 2). Also returned: the covariance of (x_m, y_m, theta_rad), (3, 3),
+    and the weighted sum of squares that is left, with 2 N - 3 degrees of freedom.
+    """
+    body, world = np.asarray(body_m, np.float64), np.asarray(world_m, np.float64)
+    weight = np.linalg.inv(np.asarray(covariances_m2, np.float64))
+    start, _ = fit_pose(body, world)
+    x_m, y_m, theta_rad = start.x_m, start.y_m, start.theta_rad
+    slopes = np.zeros((len(body), 2, 3))
+    slopes[:, 0, 0] = slopes[:, 1, 1] = 1.0
+    rest = covariance = np.empty(0)
+    for step in range(WEIGHTED_STEPS + 1):
+        c, s = math.cos(theta_rad), math.sin(theta_rad)
+        arms = body @ np.array([[c, s], [-s, c]])
+        rest = world - arms - (x_m, y_m)
+        if step == WEIGHTED_STEPS:
+            break
+        slopes[:, 0, 2], slopes[:, 1, 2] = -arms[:, 1], arms[:, 0]
+        turned = slopes.transpose(0, 2, 1) @ weight
+        covariance = np.linalg.inv((turned @ slopes).sum(axis=0))
+        dx, dy, turn = (covariance @ (turned @ rest[..., None]).sum(axis=0))[:, 0].tolist()
+        x_m, y_m, theta_rad = x_m + dx, y_m + dy, theta_rad + turn
+    left = float(np.sum(rest[:, None] @ weight @ rest[..., None]))
+    return Pose(x_m, y_m, wrap_pi(theta_rad)), covariance, left

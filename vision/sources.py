@@ -8,11 +8,9 @@ stamp where there is one (else the time at which grab returned), never the time 
 
 from __future__ import annotations
 
-import math
 import re
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +24,7 @@ from hil.core.errors import BadInput, RigFault
 from hil.core.rig import Frame
 from hil.core.wording import past
 from vision import cv_compat
+from vision.camera_watch import FrameWatch
 from vision.frame_queue import FrameQueue
 from vision.video_file import VideoFile as VideoFile  # noqa: PLC0414 - beside the other sources
 
@@ -35,6 +34,9 @@ STALL_S = 0.2
 START_S = 3.0
 SETTLE_FRAMES = 20
 STALE_FRAMES_MAX = 10
+REOPEN_S = 0.2  # between two tries to open a camera that is gone
+# A control within this of what was asked for is it: drivers work in steps of their own.
+CONTROL_RATIO = 0.02
 # Driver stamps are believed when they lie this close before the time at which grab returned.
 STAMP_AGE_MAX_S = 1.0
 
@@ -60,6 +62,8 @@ class CameraControls:
     exposure: float | None = None
     gain: float | None = None
     white_balance_k: float | None = None
+    focus: float | None = None
+    raw: bool = False  # uncompressed pictures and not motion JPEG
 
 
 # control -> (automatic's property, its value for off, the property locked); V4L2's meanings.
@@ -75,7 +79,10 @@ class LiveCamera:
     """A camera in real time, as `hil.rigs.frames.FrameSource`.
 
     Exposure, gain, white balance and focus are locked: at the given values, else at those the
-    automatics settled on. `locked` says at what, `unlocked` which the driver did not let be.
+    automatics settled on. `locked` says at what, read back from the driver; `unlocked` which it did
+    not let be, `refused` where another value is in force than was asked for: name, asked, in force.
+    What is odd comes with the next frame as its `note`. A camera that is unplugged is waited for
+    `patience_s` long; a run has none, for its robot must stop.
     """
 
     def __init__(
@@ -84,33 +91,45 @@ class LiveCamera:
         controls: CameraControls | None = None,
         capture: Capture | None = None,
         clock: Callable[[], float] = time.monotonic,
+        *,
+        patience_s: float = STALL_S,
+        opener: Callable[[int], Capture] = cv2.VideoCapture,
     ) -> None:
         self.name = f"camera {device}"
+        self._device, self._opener = device, opener
         self._clock = clock
-        self._capture: Capture = capture if capture is not None else cv2.VideoCapture(device)
+        self._capture: Capture = capture if capture is not None else opener(device)
         if not self._capture.isOpened():
             raise RigFault(f"{self.name}: cannot be opened; `hil doctor` lists the cameras")
-        self.locked: dict[str, float] = {}
-        self.unlocked: list[str] = []
-        controls = controls or CameraControls()
+        self._controls = controls = controls or CameraControls()
         try:
-            self._set_format(controls)
-            self._lock(controls)
+            self._set_up()
         except RigFault:
             self._capture.release()
             raise
         self._queue = FrameQueue()
-        self._periods_s: deque[float] = deque(maxlen=101)
+        self._watch = FrameWatch(controls.rate_hz)
         self._newest_s = clock()
+        self._patience_s = patience_s
         self._limit_s = START_S
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=self.name, daemon=True)
         self._thread.start()
 
+    def _set_up(self) -> None:
+        """Set format and controls, and note what the driver did not take."""
+        self.locked: dict[str, float] = {}
+        self.unlocked: list[str] = []
+        self.refused: list[tuple[str, float, float]] = []
+        self._set_format(self._controls)
+        self._lock(self._controls)
+        self._notes = self._oddities()
+
     def _set_format(self, controls: CameraControls) -> None:
         """Ask for motion JPEG (raw 720p does not fit USB 2 at 30 Hz), size, rate, a short queue."""
+        self._fourcc = cv2.VideoWriter.fourcc(*("YUYV" if controls.raw else "MJPG"))
         wanted = {
-            cv2.CAP_PROP_FOURCC: float(cv2.VideoWriter.fourcc(*"MJPG")),
+            cv2.CAP_PROP_FOURCC: float(self._fourcc),
             cv2.CAP_PROP_FRAME_WIDTH: controls.width_px,
             cv2.CAP_PROP_FRAME_HEIGHT: controls.height_px,
             cv2.CAP_PROP_FPS: controls.rate_hz,
@@ -132,43 +151,94 @@ class LiveCamera:
         self.width_px, self.height_px = have
 
     def _lock(self, controls: CameraControls) -> None:
-        """Let the automatics settle, then turn them off and set what they chose or what is given."""
+        """Let the automatics settle, then turn them off and set what they chose or what is given.
+
+        What is in force is read back: many a driver takes a value without a word and drops it.
+        """
         for _ in range(SETTLE_FRAMES):
             if not self._capture.grab():
                 raise RigFault(f"{self.name}: gives no frames; is another program using it?")
         for name, (automatic, off, key) in LOCKS.items():
-            given = getattr(controls, name, None)
+            given = getattr(controls, name)
             value = self._capture.get(key) if given is None else float(given)
             done = automatic is None or self._capture.set(automatic, off)
-            if done and self._capture.set(key, value):
-                self.locked[name] = self._capture.get(key)
-            else:
+            if not (done and self._capture.set(key, value)):
                 self.unlocked.append(name)
+                continue
+            self.locked[name] = self._capture.get(key)
+            if abs(self.locked[name] - value) > CONTROL_RATIO * abs(value):
+                self.refused.append((name, value, self.locked[name]))
+
+    def _oddities(self) -> list[str]:
+        """Return what the driver did not do, a sentence each."""
+        said = [
+            f"{name}: {asked:g} asked for, {have:g} in force" for name, asked, have in self.refused
+        ]
+        given = [name for name in self.unlocked if getattr(self._controls, name) is not None]
+        said += [f"{name}: cannot be set" for name in given]
+        automatic = [name for name in self.unlocked if name not in given]
+        if automatic:
+            said.append(f"{', '.join(automatic)}: left to the camera's automatics")
+        have = int(self._capture.get(cv2.CAP_PROP_FOURCC))
+        if have not in {0, self._fourcc}:
+            said.append(f"pictures come as {_letters(have)}, {_letters(self._fourcc)} asked for")
+        return said
 
     @property
     def rate_hz(self) -> float:
         """The true frame rate: one over the median distance of the last stamps; NaN before."""
-        return 1.0 / float(np.median(self._periods_s)) if self._periods_s else math.nan
+        return self._watch.rate_hz
+
+    @property
+    def age_s(self) -> float:
+        """How old frames are when they arrive, by the driver's stamps; NaN where it has none."""
+        return self._watch.age_s
 
     def _run(self) -> None:
         """Empty the driver's queue for ever, stamping each frame as it is grabbed."""
         self._drop_stale()
-        index, previous_s = 0, -math.inf
+        index = 0
         while not self._stop.is_set():
             if not self._capture.grab():
-                self._queue.fail(f"{self.name}: gone after {index} frames; was it unplugged?")
+                if self._back_again(index):
+                    continue
+                if not self._stop.is_set():
+                    self._queue.fail(f"{self.name}: gone after {index} frames; was it unplugged?")
                 return
             arrival_s = self._clock()
             stamp_s = self._stamp_s(arrival_s)
             done, image = self._capture.retrieve()
             if not done or image is None:
                 continue  # a broken JPEG: as good as a dropped frame
-            if math.isfinite(previous_s):
-                self._periods_s.append(stamp_s - previous_s)
-            previous_s = stamp_s
-            self._newest_s, self._limit_s = arrival_s, STALL_S
-            self._queue.put(Frame(index, stamp_s, np.asarray(image, dtype=np.uint8)))
+            if not self._watch.take(stamp_s, arrival_s, np.asarray(image, dtype=np.uint8)):
+                continue  # the frame before once more
+            said = self._watch.said()
+            note = "; ".join([*self._notes, *([said] if said else [])])
+            self._notes = []
+            self._newest_s, self._limit_s = arrival_s, max(STALL_S, self._patience_s)
+            self._queue.put(Frame(index, stamp_s, np.asarray(image, np.uint8), note=note))
             index += 1
+
+    def _back_again(self, index: int) -> bool:
+        """Wait for a camera that is gone, and set it up anew; False when patience is at its end."""
+        gone_s = self._clock()
+        if self._patience_s <= STALL_S:
+            return False
+        self._capture.release()
+        while not self._stop.wait(REOPEN_S) and self._clock() - gone_s < self._patience_s:
+            self._capture = self._opener(self._device)
+            if not self._capture.isOpened():
+                continue
+            try:
+                self._set_up()
+            except RigFault:
+                self._capture.release()
+                continue
+            self._drop_stale()
+            self._watch.restart()
+            self._notes.append(f"gone for {self._clock() - gone_s:.1f} s after frame {index - 1}")
+            return True
+        return False
 
     def _drop_stale(self) -> None:
         """Throw away what waited in the driver's queue: frames that come without a wait."""
@@ -193,9 +263,11 @@ class LiveCamera:
         frame = self._queue.poll()
         silence_s = self._clock() - self._newest_s
         if frame is None and silence_s > self._limit_s:
+            repeated = self._watch.repeated
+            same = f" ({repeated} came that were the one before once more)" if repeated else ""
             raise RigFault(
                 f"{self.name}: no frame for {past(silence_s, self._limit_s, '.2f')} s, limit"
-                f" {self._limit_s:g} s; check the cable, and that exposure fits the frame rate"
+                f" {self._limit_s:g} s{same}; check the cable, and that exposure fits the frame rate"
             )
         return frame
 
@@ -212,6 +284,11 @@ class LiveCamera:
         if not self._thread.is_alive():
             self._capture.release()
         self._queue.close()
+
+
+def _letters(fourcc: int) -> str:
+    """Return the four letters of a picture format."""
+    return fourcc.to_bytes(4, "little").decode("latin-1").strip()
 
 
 def image_files(folder: Path) -> list[Path]:

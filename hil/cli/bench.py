@@ -2,57 +2,102 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import click
 
 from hil.cli.options import json_option, print_json
 
+if TYPE_CHECKING:
+    from hil.analysis.speed import Figure
+
+
+# What is measured in medians of several runs, and can be compared with another revision's.
+_SPEED = ("speed", "parts", "batch", "law", "campaign", "report")
+
 
 @click.command("bench")
 @click.argument(
-    "what", type=click.Choice(["speed", "parts", "wheels", "vision", "firmware"]), default="speed"
+    "what",
+    type=click.Choice([*_SPEED, "wheels", "vision", "firmware"]),
+    default="speed",
 )
 @click.option("--runs", type=click.IntRange(1, 100), default=5, show_default=True,
-              help="speed, parts: counted runs of each figure, after one that is not counted; "
+              help="speed to report: counted runs of each figure, after one that is not counted; "
               "wheels: robots drawn from 10 % around the believed one.")  # fmt: skip
 @click.option("--tune", "candidates", type=click.IntRange(11, 100_000), metavar="CANDIDATES",
               help="wheels: search the gains of both laws, that many candidates each.")  # fmt: skip
+@click.option("--against", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+              help="speed to report: compare with what --json printed at another revision: ratio of "
+              "the medians with its 95 % interval.")  # fmt: skip
+@click.option("--page", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+              help="vision: write an HTML page with the worst frames there.")  # fmt: skip
+@click.option("--frames", type=click.IntRange(2, 10_000), default=40, show_default=True,
+              help="vision: frames of each condition that marks, tags and peers are shown.")  # fmt: skip
+@click.option("--empty", type=click.IntRange(1, 1_000_000), default=10_000, show_default=True,
+              help="vision: frames without the robot, full of things like it.")  # fmt: skip
 @json_option
-def command(what: str, runs: int, candidates: int | None, as_json: bool) -> None:
+def command(
+    what: str, runs: int, candidates: int | None, against: Path | None, page: Path | None,
+    frames: int, empty: int, as_json: bool,
+) -> None:  # fmt: skip
     """Measure the speed of the harness, or compare the wheel laws of the board.
 
     \b
     speed     medians of several runs, with least and largest
     parts     what a tick's shares, a report and the viewer's file cost
+    batch     runs a second and times real time of one core, by camera, and of the plant alone
+    law       the whole loop with an own law in Python, and with built-in ones
+    campaign  runs a second of a campaign on all cores
+    report    a campaign's answers and page
     wheels    both wheel laws at step, ramp, crawl, turn, load, friction, battery sag
-    vision    the colour marks on rendered sequences of known truth; some minutes
+    vision    the colour marks on rendered sequences with known truth, and beside cv2.aruco,
+              AprilTag and a plain threshold; half an hour
     firmware  what the sketch costs the Mega 2560: cycles by part, load, memory
     """  # noqa: D301 - \b is click's mark for a verbatim paragraph
-    if what in {"speed", "parts"} and candidates is not None:
+    if what != "vision" and page is not None:
+        raise click.UsageError(f"--page: {what} has no frames to show; only vision has")
+    if page is not None and not page.absolute().parent.is_dir():
+        raise click.UsageError(f"--page {page}: there is no folder {page.absolute().parent}")
+    if what in _SPEED and candidates is not None:
         raise click.UsageError("--tune: the wheels have gains, the speed figures have none")
+    if what not in _SPEED and against is not None:
+        raise click.UsageError(f"--against: for {', '.join(_SPEED)}")
     if candidates is not None:
         _tune_wheels(candidates, as_json)
     elif what == "wheels":
         _compare_wheels(runs, as_json)
     elif what == "vision":
-        _measure_vision(as_json)
+        _measure_vision(frames, empty, page, as_json)
     elif what == "firmware":
         _measure_firmware(as_json)
     else:
-        _measure_speed(what, runs, as_json)
+        _measure_speed(what, runs, against, as_json)
 
 
-def _measure_vision(as_json: bool) -> None:
-    from hil.tools import bench_vision
+def _measure_vision(frames: int, without: int, page: Path | None, as_json: bool) -> None:
+    from dataclasses import asdict
+
+    from hil.core.files import replace_file
+    from hil.tools import bench_peers, bench_vision
 
     def progress(text: str) -> None:
         click.echo(text, err=True)
 
     rows = bench_vision.table(100, progress)
-    empty = bench_vision.empty_scenes(10_000, progress)
+    empty = bench_vision.empty_scenes(without, progress)
+    shown = list(bench_peers.lines(frames, progress))
+    peers = [line for lines, _ in shown for line in lines]
+    if page is not None:
+        text = bench_peers.as_page(peers, [worst for _, worst in shown])
+        replace_file(page, text.encode("utf-8"))
     if as_json:
-        print_json(bench_vision.as_document(rows, empty))
+        document = bench_vision.as_document(rows, empty)
+        print_json({**document, "peers": [asdict(line) for line in peers]})
         return
     click.echo(bench_vision.as_markdown(rows, empty))
+    click.echo("\n" + bench_peers.as_markdown(peers))
 
 
 def _measure_firmware(as_json: bool) -> None:
@@ -78,12 +123,38 @@ def _measure_firmware(as_json: bool) -> None:
     Console().print(parts, table)
 
 
-def _measure_speed(what: str, runs: int, as_json: bool) -> None:
-    from hil.tools import bench, bench_parts
+def _measured(what: str, runs: int) -> list[Figure]:
+    if what == "speed":
+        from hil.tools import bench
 
-    found = bench_parts.figures(runs) if what == "parts" else bench.figures(runs)
+        return bench.figures(runs)
+    if what == "parts":
+        from hil.tools import bench_parts
+
+        return bench_parts.figures(runs)
+    from hil.study.campaign import speed
+    from hil.tools import bench_runs
+
+    plans = {
+        "batch": bench_runs.batch_figures,
+        "law": bench_runs.law_figures,
+        "campaign": speed.campaign_figures,
+        "report": speed.report_figures,
+    }
+    return plans[what](runs)
+
+
+def _measure_speed(what: str, runs: int, against: Path | None, as_json: bool) -> None:
+    from hil.tools import bench, bench_history
+
+    then = None if against is None else bench_history.read_history(against, what)
+    found = _measured(what, runs)
+    ratios = [] if then is None else bench_history.compared(found, then)
     if as_json:
-        print_json(bench.as_document(found))
+        document = bench.as_document(what, found)
+        if then is not None:
+            document["against"] = bench_history.as_list(ratios)
+        print_json(document)
         return
     from rich.console import Console
     from rich.table import Table
@@ -93,6 +164,13 @@ def _measure_speed(what: str, runs: int, as_json: bool) -> None:
         values = (f"{value:.3g}" for value in (figure.median, figure.least, figure.largest))
         table.add_row(figure.name, *values, figure.unit, figure.goal)
     Console().print(table)
+    if then is None:
+        return
+    other = Table("figure", "then", "now", "unit", "now / then", "95 % interval")
+    for r in ratios:
+        numbers = (f"{value:.3g}" for value in (r.then, r.now))
+        other.add_row(r.name, *numbers, r.unit, f"{r.ratio:.3g}", f"{r.low:.3g} to {r.high:.3g}")
+    Console().print(other)
 
 
 def _compare_wheels(robots: int, as_json: bool) -> None:

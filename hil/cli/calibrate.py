@@ -89,6 +89,10 @@ def camera(
         click.echo(summary.lens_text(result, views.missed, camera_file))
 
 
+# A camera whose cable was pulled while the board was carried about is waited for so long.
+UNPLUGGED_S = 20.0
+
+
 def _views(source: str, board: Board, wanted: int) -> Views:
     """Return the board's views of a folder, a video or a live camera."""
     from vision.calibration.views import views_of_camera, views_of_folder, views_of_video
@@ -98,7 +102,7 @@ def _views(source: str, board: Board, wanted: int) -> Views:
         click.echo(line, err=True)
 
     if source.isdigit():
-        live = LiveCamera(int(source))
+        live = LiveCamera(int(source), patience_s=UNPLUGGED_S)
         try:
             return views_of_camera(board, live, wanted, report)
         finally:

@@ -30,6 +30,7 @@ COMMANDS = {
     ),
     "export": ("hil.cli.export", "Write a record as MCAP (Foxglove), ULog (PX4) or CSV."),
     "fit": ("hil.cli.fit", "Find what a log tells of a robot; write its robot file."),
+    "console": ("hil.cli.console", "The rig in a browser: run, watch, STOP, look at records."),
     "view": ("hil.cli.view", "Open recorded runs in the viewer."),
     "sweep": ("hil.cli.sweep", "Run a campaign over grids, lists and distributions; draw maps."),
     "list": ("hil.cli.listing", "List laws, estimators, localisers, scenarios, ... with settings."),

@@ -139,6 +139,12 @@ class MarksConfig(Section):
         gt=0.0,
         le=100.0,
     )
+    which_m: Vec2 | None = quantity(
+        "m",
+        "world: of several robots alike ours is the one nearest to here when it is first looked "
+        "for, later the one nearest to where it is expected; left out: two are one too many",
+        None,
+    )
     swapped_marks: bool = Field(
         False, description="fault: colours changed over on the robot, the host not told"
     )
@@ -308,6 +314,15 @@ class CameraConfig(Section):
     )
     exposure_s: float = quantity(
         "s", "3 mm of blur at 0.5 m/s", 0.006, gt=0.0, le=0.1, source="indoor light"
+    )
+    line_time_s: float = quantity(
+        "s",
+        "rolling shutter: from one row's exposure to the next below, some 30 us; a frame's time is "
+        "that of its middle row; 0: all rows at once",
+        0.0,
+        ge=0.0,
+        le=1e-4,
+        source="default condition",
     )
     latency_s: float = quantity(
         "s", "middle of exposure to host", 0.060, ge=0.0, le=1.0, source="default condition"

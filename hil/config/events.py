@@ -50,6 +50,8 @@ FaultKind = Literal[
     "dead_channel_a",
     "dead_channel_b",
     "swapped_phases",  # A and B exchanged: counts run backward
+    "encoder_noise",  # a pulse of 0.1 ms on both channels of one side every millisecond
+    "gear_slip",  # the motor turns on, with its encoder: strength_ratio of its turn reaches the wheel
     "motor_reversed",  # polarity of one side's motors
     "motor_stuck",  # one side's gears jam
     "motor_weak",  # a share of the voltage reaches one side's motors: strength_ratio
@@ -57,15 +59,36 @@ FaultKind = Literal[
     "encoders_exchanged",  # plugs of left and right encoders
     "board_reset",  # board held in reset from start to end, then boots anew
     "link_cut",  # nothing passes either way
+    "link_down_cut",  # half open: nothing reaches the board
+    "link_up_cut",  # half open: nothing reaches the host
+    "link_duplicated",  # every chunk arrives twice, both ways
+    "link_reordered",  # of two chunks the second one arrives first, both ways
     "camera_stall",  # no frames
     "camera_occluded",  # robot hidden from the camera
     "camera_repeated",  # frames keep coming with new stamps, each a copy of the last one
+    "camera_clock_step",  # stamps step by step_s
+    "camera_exposure",  # the light on the sensor is light_ratio of what it was
+    "camera_colours",  # red and blue exchanged: another order of bytes than the driver says
+    "camera_mark_covered",  # the front mark is as black as the plate
+    "camera_second_robot",  # one that looks the same, at (x_m, y_m), heading along world X
+    "host_stopped",  # the host's process does not run (SIGSTOP, a suspended machine)
+    "host_overloaded",  # the host's process gets to run only once in late_s
+    "host_clock_step",  # the host's clock steps by step_s
 ]
+# Faults of a picture: without one (--camera pose) they cannot be.
+OF_PICTURES = (
+    "camera_exposure",
+    "camera_colours",
+    "camera_mark_covered",
+    "camera_second_robot",
+)
 SIDED = {
     "dead_encoder",
     "dead_channel_a",
     "dead_channel_b",
     "swapped_phases",
+    "encoder_noise",
+    "gear_slip",
     "motor_reversed",
     "motor_stuck",
     "motor_weak",
@@ -133,14 +156,27 @@ class Fault(Section):
     start_s: float = quantity("s", "in force from then on; 0: from power-up", 0.0, ge=0, le=3600)
     end_s: float | None = quantity("s", "None: to the end of the run", None, gt=0, le=3600)
     strength_ratio: float = quantity(
-        "(ratio)", "of motor_weak: what is left of its voltage", 0.4, gt=0, le=1
+        "(ratio)",
+        "of motor_weak: what is left of its voltage; of gear_slip: of its turn",
+        0.4,
+        gt=0,
+        le=1,
     )
+    light_ratio: float = quantity(
+        "(ratio)", "of camera_exposure: light on the sensor over what it was", 3.0, ge=0, le=100
+    )
+    step_s: float = quantity("s", "of a clock that steps; negative: back", 5.0, ge=-3600, le=3600)
+    late_s: float = quantity("s", "of host_overloaded: from run to run", 0.1, gt=0, le=60)
+    x_m: float = quantity("m", "of camera_second_robot: where it stands", 0.0, ge=-50, le=50)
+    y_m: float = quantity("m", "of camera_second_robot: where it stands", 0.0, ge=-50, le=50)
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
         _check_times(self.start_s, self.end_s)
         if self.kind not in SIDED and self.side != "both":
             raise ValueError(f"side: {self.kind} has no side")
+        if self.kind == "host_stopped" and (self.end_s is None or self.start_s == 0.0):
+            raise ValueError("host_stopped needs end_s, and a start_s above 0: who would go on?")
         return self
 
 

@@ -220,7 +220,10 @@ def _rate_of(soonest: list[tuple[float, float]]) -> tuple[float, float]:
         drift = sum((t - mean_t) * (y - mean_y) for t, y in points) / tt
         off_s = [abs(y - mean_y - drift * (t - mean_t)) for t, y in points]
         limit_s = 4.0 * sorted(off_s)[n // 2] + _FLOOR_S
-        points = [point for point, off in zip(points, off_s, strict=True) if off <= limit_s]
+        kept = [point for point, off in zip(points, off_s, strict=True) if off <= limit_s]
+        if len(kept) == n:  # the same once more
+            break
+        points = kept
     noise = sum(off * off for off in off_s) / (n - 2) + _FLOOR_S**2
     precision = tt / noise + 1.0 / prior
     return drift * tt / noise / precision, 1.0 / precision

@@ -80,12 +80,14 @@ class Frame:
 
     `t_cam_s` is the middle of the exposure on the camera's own clock. `image` is (H, W, 3) uint8
     BGR; it is None when the source gives poses itself (`--camera pose`), and `pose` is set then.
+    `note` is what a camera has to say of itself since the frame before, for the record; "" mostly.
     """
 
     index: int
     t_cam_s: float
     image: NDArray[np.uint8] | None
     pose: PoseMeasurement | None = None
+    note: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,12 +41,18 @@ class Pose:
     theta_rad: float
 
 
+# Upper triangle of a symmetric 3 x 3 matrix of (x_m, y_m, theta_rad): xx, xy, xt, yy, yt, tt.
+Covariance = tuple[float, float, float, float, float, float]
+
+
 @dataclass(frozen=True, slots=True)
 class PoseMeasurement:
     """What the localiser says of one frame.
 
     `pose` is None when the robot was not seen, and `reason` then says why. `quality` is 0 to 1.
-    `sigma_xy_m` and `sigma_theta_rad` are the standard deviations the localiser claims.
+    `sigma_xy_m` and `sigma_theta_rad` are the standard deviations the localiser claims;
+    `covariance`, where it knows more, is the upper triangle (xx, xy, xt, yy, yt, tt) of that of
+    (x_m, y_m, theta_rad), whose diagonal they sum up.
     `details` holds figures worth recording (mark areas, contrast, window or full frame, residual).
     """
 
@@ -56,6 +62,7 @@ class PoseMeasurement:
     sigma_xy_m: float = 0.001
     sigma_theta_rad: float = 0.005
     details: dict[str, float] = field(default_factory=dict)
+    covariance: Covariance | None = None
 
 
 @dataclass(frozen=True, slots=True)

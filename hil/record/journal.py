@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -25,7 +25,10 @@ from hil.record.writing import GuardedFile, Keeping
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-Columns = dict[str, "NDArray[np.float64]"]
+Columns = Mapping[str, "NDArray[np.float64]"]
+# Rows of a Parquet row group. A table that fits one is held in memory whole; of a longer one there is
+# never more than that, or one column at a time (an hour of 30 Hz has 108,000).
+GROUP_ROWS = 1 << 16
 _FORMAT = "hil-journal-1"
 _MAX_HEADER = 65_536
 
@@ -53,30 +56,75 @@ class Journal:
         self._file.close()
 
 
-def read_journal(path: Path) -> Columns:
+def read_journal(path: Path) -> dict[str, NDArray[np.float64]]:
     """Return every whole row of a journal, cut off or not; raises BadInput for another file."""
-    data = path.read_bytes()
-    end = data.find(b"\n", 0, _MAX_HEADER)
-    if end < 0:
-        return {}  # cut off before the first row could be written
+    whole: dict[str, NDArray[np.float64]] = {}
+    for columns in _journal_groups(path, None):
+        whole = columns
+    return whole
+
+
+def _journal_groups(path: Path, rows: int | None) -> Iterator[dict[str, NDArray[np.float64]]]:
+    """Yield a journal's whole rows, so many at a time (all at once for None); raises BadInput."""
+    with path.open("rb") as file:
+        head = file.readline(_MAX_HEADER)
+        if not head.endswith(b"\n"):
+            return  # cut off before the first row could be written
+        names = _names_of(head, path)
+        width = 8 * len(names)
+        first = True
+        while True:
+            data = file.read(-1 if rows is None else rows * width)
+            found = len(data) // width
+            if not found and not first:
+                return
+            first = False
+            table = np.frombuffer(data, "<f8", found * len(names)).reshape(found, len(names))
+            yield {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(names)}
+            if rows is None or found < rows:
+                return
+
+
+def _names_of(head: bytes, path: Path) -> list[str]:
     try:
-        header = json.loads(data[:end])
+        header = json.loads(head)
         names = [str(name) for name in header["columns"]]
         known = header["format"] == _FORMAT
     except (ValueError, KeyError, TypeError):
         known = False
     if not known:
         raise BadInput(f"{path}: damaged: the first line is not that of a {_FORMAT} file")
-    width = 8 * len(names)
-    rows = (len(data) - end - 1) // width
-    table = np.frombuffer(data, "<f8", rows * len(names), end + 1).reshape(rows, len(names))
-    return {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(names)}
+    return names
+
+
+def journal_to_parquet(journal: Path, parquet: Path, schema: Sequence[Column]) -> Columns:
+    """Write a journal's rows as a Parquet file, a row group at a time, and return the table."""
+    rows = 0
+    columns: Columns = {}
+    with replacing(parquet) as part:
+        writer: pq.ParquetWriter | None = None
+        try:
+            for columns in _journal_groups(journal, GROUP_ROWS):
+                table = arrow_table(columns, schema)
+                rows += table.num_rows
+                if writer is None:
+                    writer = pq.ParquetWriter(part, table.schema, **_PARQUET)
+                writer.write_table(table)
+        finally:
+            if writer is not None:
+                writer.close()
+        if writer is None:
+            pq.write_table(arrow_table({}, schema), part, **_PARQUET)
+    return columns if rows <= GROUP_ROWS else ColumnsOnDisk(parquet)
+
+
+_PARQUET: dict[str, Any] = {"compression": "zstd", "use_dictionary": False}
 
 
 def write_parquet(path: Path, columns: Columns, schema: Sequence[Column]) -> None:
     """Write the table atomically; equal values give an equal file (no time or host inside)."""
     with replacing(path) as part:
-        pq.write_table(arrow_table(columns, schema), part, compression="zstd", use_dictionary=False)
+        pq.write_table(arrow_table(columns, schema), part, **_PARQUET)
 
 
 def arrow_table(columns: Columns, schema: Sequence[Column]) -> pa.Table:
@@ -103,11 +151,48 @@ def _arrow_array(values: NDArray[np.float64], column: Column) -> pa.Array:
 def read_parquet(path: Path) -> Columns:
     """Return every column as float64, NaN where the file has null; raises BadInput."""
     try:
+        whole = ColumnsOnDisk(path)
+        if whole.rows > GROUP_ROWS:
+            return whole
         table = pq.read_table(path)
-        return {
-            name: table.column(name).combine_chunks().cast(pa.float64()).to_numpy(False)
-            for name in table.column_names
-        }
+        return {name: _floats(table.column(name)) for name in table.column_names}
     except (OSError, pa.ArrowException) as error:
-        first = str(error).splitlines()[0]
-        raise BadInput(f"{path}: damaged, not readable as Parquet: {first}") from None
+        raise _damaged(path, error) from None
+
+
+def _floats(column: pa.ChunkedArray) -> NDArray[np.float64]:
+    values: NDArray[np.float64] = column.combine_chunks().cast(pa.float64()).to_numpy(False)
+    return values
+
+
+def _damaged(path: Path, error: Exception) -> BadInput:
+    first = str(error).splitlines()[0]
+    return BadInput(f"{path}: damaged, not readable as Parquet: {first}")
+
+
+class ColumnsOnDisk(Mapping[str, "NDArray[np.float64]"]):
+    """The columns of a Parquet file, each read when it is asked for; raises BadInput where it cannot."""
+
+    def __init__(self, path: Path) -> None:
+        with pq.ParquetFile(path) as file:
+            self._names = list(file.schema_arrow.names)
+            self.rows = int(file.metadata.num_rows)
+        self._path = path
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """Return one column; raises KeyError for one that there is not."""
+        if name not in self._names:
+            raise KeyError(name)
+        try:
+            with pq.ParquetFile(self._path) as file:
+                return _floats(file.read(columns=[name]).column(name))
+        except (OSError, pa.ArrowException) as error:
+            raise _damaged(self._path, error) from None
+
+    def __iter__(self) -> Iterator[str]:
+        """Return the names in the order of the file."""
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        """Return how many columns there are."""
+        return len(self._names)

@@ -17,6 +17,7 @@ from hil.record import layout
 from hil.record.journal import Columns, read_journal, read_parquet
 from hil.record.manifest import Manifest, file_entry, read_manifest
 from hil.record.schema import ADDED_LATER, FRAME_NAMES
+from hil.record.tick_rows import COVARIANCE
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,13 +118,16 @@ def read_run(path: Path) -> RunRecord:
     problems += altered_files(path, manifest)
     samples = read_table(path, layout.SAMPLES, layout.SAMPLES_JOURNAL, required=True)
     rows = samples["t_s"].size if "t_s" in samples else 0
-    samples = {name: np.full(rows, math.nan) for name in ADDED_LATER} | samples
+    if not set(ADDED_LATER) <= set(samples):
+        samples = {name: np.full(rows, math.nan) for name in ADDED_LATER} | dict(samples)
     missing = [name for name in manifest.sample_names if name not in samples]
     if missing:
         raise BadInput(f"{path / layout.SAMPLES}: damaged: column {missing[0]} is missing")
     frames: Columns = {}
     try:
-        frames = read_table(path, layout.FRAMES, layout.FRAMES_JOURNAL, required=False)
+        frames = completed_frames(
+            read_table(path, layout.FRAMES, layout.FRAMES_JOURNAL, required=False)
+        )
     except BadInput as error:  # the samples are whole: what was seen is lost, the run is not
         problems.append(str(error))
     return RunRecord(
@@ -135,6 +139,13 @@ def read_run(path: Path) -> RunRecord:
         pictures=read_pictures(path / layout.PICTURES),
         problems=tuple(problems),
     )
+
+
+def completed_frames(frames: Columns) -> Columns:
+    """Return the frames with the covariance that records made before it was kept do not have."""
+    rows = len(frames["t_cam_s"]) if "t_cam_s" in frames else 0
+    missing = [name for name in COVARIANCE if name not in frames] if rows else []
+    return {**frames, **{name: np.full(rows, np.nan) for name in missing}}
 
 
 def altered_files(path: Path, manifest: Manifest) -> list[str]:

@@ -15,7 +15,7 @@ from hil.core.errors import BadInput, RecordFault
 from hil.core.files import PART, replace_file
 from hil.record import layout
 from hil.record.camera import CameraKeeper
-from hil.record.journal import Columns, Journal, read_journal, write_parquet
+from hil.record.journal import Columns, Journal, journal_to_parquet
 from hil.record.manifest import Manifest, Outcome, Plugin, file_entry, write_manifest
 from hil.record.reader import RunRecord, read_events, read_pictures
 from hil.record.schema import FRAME_COLUMNS, FRAME_NAMES, Column
@@ -186,8 +186,11 @@ class Recorder:
         except RecordFault:
             pass
         except Exception as error:
-            self._give_up(f"the record could not be finished: {error}")
-            raise
+            with suppress(RecordFault):  # what is not found any more shows in many ways
+                self._keeping.check(self.path / layout.MANIFEST)
+            if self._keeping.fault is None:
+                self._give_up(f"the record could not be finished: {error}")
+                raise
         assert self._keeping.fault is not None
         before = (
             f"{detail}; "
@@ -242,8 +245,7 @@ class Recorder:
             self._camera.close()
 
     def _finish_table(self, journal: str, parquet: str, schema: Sequence[Column]) -> Columns:
-        columns = read_journal(self.path / journal)
-        write_parquet(self.path / parquet, columns, schema)
+        columns = journal_to_parquet(self.path / journal, self.path / parquet, schema)
         (self.path / journal).unlink()
         return columns
 

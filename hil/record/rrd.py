@@ -18,8 +18,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from hil.analysis import metrics
-from hil.core.files import replacing
+from hil.core.files import replace_file
 from hil.core.registries import OUTER_LAWS
+from hil.core.text import visible
 from hil.record.reader import RunRecord
 
 if TYPE_CHECKING:
@@ -102,14 +103,14 @@ _MAIN_PLOTS = ("error", "sliding", "wheels", "latency")
 
 def write_rrd(path: Path, runs: Sequence[RunRecord]) -> None:
     """Write the runs to one Rerun file, atomically; the first run's name titles the recording."""
-    names = entity_names(runs)
-    with replacing(path) as part:
-        _write_all(part, runs, names)
+    replace_file(path, _in_bytes(runs, entity_names(runs)))
 
 
-def _write_all(file: Path, runs: Sequence[RunRecord], names: Sequence[str]) -> None:
+def _in_bytes(runs: Sequence[RunRecord], names: Sequence[str]) -> bytes:
+    """Return the file's content: Rerun's own writer waits for ever once a file cannot be written."""
     recording = rr.RecordingStream(APPLICATION, recording_id=_recording_id(runs))
-    recording.save(file, default_blueprint=blueprint(runs, names))
+    memory = recording.memory_recording()
+    recording.send_blueprint(blueprint(runs, names), make_active=False)
     recording.send_recording_name(" and ".join(names))
     one_scenario = len({run.manifest.scenario_name for run in runs}) == 1
     legends = [f"{name.rpartition('/')[2] if one_scenario else name} " for name in names]
@@ -118,12 +119,12 @@ def _write_all(file: Path, runs: Sequence[RunRecord], names: Sequence[str]) -> N
         prefix, lines = ("", _LINE_COLOURS) if len(runs) == 1 else (legends[index], _shades(colour))
         _Sender(recording, name, run, colour).send(_LineStyle(prefix, lines))
     recording.flush()
-    recording.disconnect()
+    return bytes(memory.drain_as_bytes())
 
 
 def entity_names(runs: Sequence[RunRecord]) -> list[str]:
     """Return a distinct entity name per run: scenario and law, numbered when they repeat."""
-    plain = [f"{run.manifest.scenario_name}/{run.manifest.outer}" for run in runs]
+    plain = [visible(f"{run.manifest.scenario_name}/{run.manifest.outer}") for run in runs]
     return [
         f"{name}-{plain[: index + 1].count(name)}" if plain.count(name) > 1 else name
         for index, name in enumerate(plain)
@@ -179,7 +180,11 @@ class _Sender:
             norm_m = np.hypot(x_m, y_m)
             derived = {"error_x_m": x_m, "error_y_m": y_m, "error_norm_m": norm_m}
             for plot in (*PLOTS, *own_plots(self._run)):
-                self._plot(plot, samples | derived, style)
+                lines = {
+                    name: derived[name] if name in derived else samples[name]
+                    for _, name, _ in plot.lines
+                }
+                self._plot(plot, lines, style)
         if self._run.pictures:
             self._camera()
         if self._run.events:
@@ -253,7 +258,7 @@ class _Sender:
     def _events(self) -> None:
         events = self._run.events
         time = [rr.TimeColumn(TIMELINE, duration=[max(event.t_s, 0.0) for event in events])]
-        text = [f"{event.t_s:.2f} s  {event.kind}: {event.text}" for event in events]
+        text = [visible(f"{event.t_s:.2f} s  {event.kind}: {event.text}") for event in events]
         level = ["WARN" if event.kind in _GRAVE else "INFO" for event in events]
         lines = rr.TextLog.columns(text=text, level=level)
         self._recording.send_columns(f"{self._name}/events", time, lines)

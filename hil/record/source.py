@@ -15,7 +15,7 @@ from hil.core.registries import BY_KIND
 from hil.core.registry import SourceText
 from hil.record import layout
 from hil.record.manifest import Manifest, read_manifest
-from hil.record.reader import altered_files, read_table
+from hil.record.reader import altered_files, completed_frames, read_table
 from hil.record.tape import Tape, read_tape
 from hil.record.tlog import LoggedFrame, read_tlog
 
@@ -66,6 +66,7 @@ def read_source(path: Path) -> Source:
             tables.append({})
     samples, frames = tables
     link = tuple(read_tlog(path / layout.LINK)) if (path / layout.LINK).is_file() else ()
+    frames = completed_frames(frames)
     return Source(path, manifest, tape, samples, frames, link, tuple(problems))
 
 

@@ -14,9 +14,14 @@ if TYPE_CHECKING:
     from hil.wire.link import BoardLink, WheelReport
 
 _NAN = math.nan
+COVARIANCE = (
+    "cov_xx_m2", "cov_xy_m2", "cov_xt_m_rad", "cov_yy_m2", "cov_yt_m_rad", "cov_tt_rad2",
+)  # fmt: skip
 MARKS = ("front_u_px", "front_v_px", "rear_u_px", "rear_v_px")
 _NO_ESTIMATE = (_NAN,) * 5
 _NO_REPORT = (_NAN,) * 6
+_NO_MARKS = (_NAN,) * len(MARKS)
+_NO_COVARIANCE = (_NAN,) * len(COVARIANCE)
 
 
 def sample_row(
@@ -87,7 +92,7 @@ def frame_row(
     frame: Frame, t_arrival_s: float, t_exposure_s: float, measurement: PoseMeasurement
 ) -> tuple[float, ...]:
     """Return one camera frame in the order of schema.FRAME_NAMES."""
-    pose, get = measurement.pose, measurement.details.get
+    pose, details = measurement.pose, measurement.details
     return (
         t_arrival_s,
         t_exposure_s,
@@ -98,5 +103,6 @@ def frame_row(
         measurement.quality,
         measurement.sigma_xy_m,
         measurement.sigma_theta_rad,
-        *(get(name, _NAN) for name in MARKS),
+        *(measurement.covariance or _NO_COVARIANCE),
+        *(tuple([details.get(name, _NAN) for name in MARKS]) if details else _NO_MARKS),
     )

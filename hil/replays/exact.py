@@ -137,7 +137,7 @@ def replay(
     if not samples["t_s"].size:
         _refuse_without_ticks(source)
     if shadow is not None:
-        samples = samples | shadow.columns(parts.vehicle.wheels, samples["t_s"].size)
+        samples = {**samples, **shadow.columns(parts.vehicle.wheels, samples["t_s"].size)}
     stamps = _stamps(source, samples, recorder.link_frames)
     return ReplayReport(
         path=path,

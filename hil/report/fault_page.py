@@ -28,7 +28,8 @@ def fault_page(cells: Sequence[Mapping[str, Any]], fault_free: Mapping[str, Any]
     ]
     if fault_free is not None:
         parts.append(
-            f"<h2>Without a fault</h2><p>{fault_free['alarms']} alarms in {fault_free['runs']} runs.</p>"
+            f"<h2>Without a fault</h2><p>{fault_free['alarms']} alarms in {fault_free['runs']} runs: with "
+            f"95 % confidence below {fault_free['most_ratio']:.2%} of them.</p>"
         )
     return "\n".join(parts) + "\n"
 

@@ -132,7 +132,9 @@ def _decode_frame(head: dict[str, Any], body: bytes) -> Frame:
     measurement = None
     if "pose" in head:
         fields = dict(head["pose"])
-        pose = fields.pop("pose")
+        pose, covariance = fields.pop("pose"), fields.pop("covariance", None)
+        if covariance is not None:
+            fields["covariance"] = tuple(covariance)
         measurement = PoseMeasurement(pose=Pose(**pose) if pose else None, **fields)
     return Frame(head["index"], head["t_cam_s"], image, measurement)
 

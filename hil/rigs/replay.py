@@ -16,9 +16,9 @@ import numpy as np
 from hil.config.mismatch import true_robot
 from hil.core.errors import BadInput, RigFault
 from hil.core.rig import Frame, Truth
-from hil.core.types import Pose, PoseMeasurement
+from hil.core.types import Covariance, Pose, PoseMeasurement
 from hil.record import layout, tape
-from hil.record.tick_rows import MARKS
+from hil.record.tick_rows import COVARIANCE, MARKS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -174,7 +174,14 @@ def _measurement(values: dict[str, float]) -> PoseMeasurement:
         values["sigma_xy_m"],
         values["sigma_theta_rad"],
         {name: values[name] for name in MARKS if not math.isnan(values[name])},
+        _covariance(values),
     )
+
+
+def _covariance(values: dict[str, float]) -> Covariance | None:
+    """Return the covariance recorded; None where the localiser, or an older record, had none."""
+    xx, xy, xt, yy, yt, tt = (values.get(name, math.nan) for name in COVARIANCE)
+    return None if math.isnan(xx) else (xx, xy, xt, yy, yt, tt)
 
 
 def recorded_images(path: Path) -> Iterator[NDArray[np.uint8]]:

@@ -39,17 +39,22 @@ from hil.runs.interruption import CtrlC
 from hil.runs.law_guard import GuardedLaw
 from hil.runs.outside import fault_of
 from hil.runs.session import Ending, Parts, Progress, Publish, Session
+from hil.runs.watched import WatchedSink
 from hil.wire.identity import board_hashes
 from hil.wire.link import BoardLink
 from vision.localisers.making import make_localiser
+from vision.spread import spread
 
 if TYPE_CHECKING:
+    from hil.config.camera import CameraConfig
     from hil.config.scenario import Scenario
     from hil.core.registry import Entry
     from hil.core.rig import Rig
-    from hil.core.types import OuterLaw
+    from hil.core.types import OuterLaw, Pose, PoseMeasurement
     from hil.record.memory import RunSink
     from hil.record.reader import RunRecord
+    from hil.runs.watched import Watch
+    from vision.tracker import Image, Localiser
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,10 +98,10 @@ def camera_for(scenario: Scenario, target: str, asked: str | None) -> str:
     return asked or (scenario.camera_source if is_simulated(target) else "0")
 
 
-def new_folder(stem: str) -> Path:
-    """Return a folder in runs/ that does not exist yet, named after `stem` and the time."""
+def new_folder(stem: str, root: Path = Path("runs")) -> Path:
+    """Return a folder in `root` that does not exist yet, named after `stem` and the time."""
     stamp = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
-    folder = Path("runs") / f"{stem}-{stamp}"
+    folder = root / f"{stem}-{stamp}"
     number = 2
     while folder.exists():
         folder = folder.with_name(f"{stem}-{stamp}-{number}")
@@ -109,6 +114,7 @@ def execute(
     progress: Progress | None = None,
     rig: Rig | None = None,
     publish: Publish | None = None,
+    watch: Watch | None = None,
 ) -> RunRecord:
     """Run the spec and return its closed record; raises BadInput before anything is written.
 
@@ -117,7 +123,7 @@ def execute(
     are left in good order.
 
     `rig` is another one than the spec's target names; it is closed here. `publish` is given the
-    estimate of every tick.
+    estimate of every tick, `watch` everything that the record is given, after it.
     """
     cv2.setNumThreads(1)  # search windows are small: handing them to threads costs more
     check_fit(spec.scenario)
@@ -137,8 +143,11 @@ def execute(
                 frame_rate_hz=spec.scenario.camera.rate_hz,
                 rerun=spec.rerun,
             )
+            sink = recorder if watch is None else WatchedSink(recorder, watch)
             try:
-                parts = make_parts(spec, TapedRig(rig, recorder.tape, ctrl_c.obey), recorder, law)
+                parts = make_parts(spec, TapedRig(rig, recorder.tape, ctrl_c.obey), sink, law)
+                if watch is not None:
+                    watch.began(parts)
                 session = Session(
                     spec.scenario, parts, parameters, board_hashes, progress, publish
                 )  # fmt: skip
@@ -257,7 +266,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
         rig=rig,
         link=BoardLink(rig.stream, timeline.link_frame),
         camera_clock=CameraClock(scenario.camera.latency_s),
-        localiser=make_localiser(scenario.camera),
+        localiser=_localiser_of(spec),
         estimator=make_estimator(control.estimator, control, vehicle.geometry),
         law=TurnFirst(
             WithinWheelSpeed(law or make_law(spec), vehicle, wheel_speed_max_rad_s(scenario)),
@@ -269,6 +278,28 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
         timeline=timeline,
         own_terms=tuple(OUTER_LAWS.get(spec.outer).trace),
     )
+
+
+class _WhenAsked:
+    """The localiser of a run whose frames bring their poses: made when an image comes after all."""
+
+    def __init__(self, camera: CameraConfig) -> None:
+        self._camera = camera
+        self._made: Localiser | None = None
+
+    def locate(
+        self, image_bgr: Image, predicted: Pose | None, search_radius_m: float
+    ) -> PoseMeasurement:
+        """Return what the camera's localiser says."""
+        self._made = self._made or make_localiser(self._camera)
+        return self._made.locate(image_bgr, predicted, search_radius_m)
+
+
+def _localiser_of(spec: RunSpec) -> Localiser:
+    """Return the localiser of a run; where poses are drawn its projections need not be worked out."""
+    if is_simulated(spec.target) and spec.camera == "pose":
+        return _WhenAsked(spec.scenario.camera)
+    return spread(make_localiser(spec.scenario.camera))
 
 
 def make_manifest(spec: RunSpec) -> Manifest:

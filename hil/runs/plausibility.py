@@ -40,8 +40,8 @@ _TURNED_RATIO, _DIP_RATIO = 0.6, 0.05
 _DIPS, _DIP_WINDOW_S, _DIP_LEAST_S, _DIP_MOST_S = 2, 4.0, 0.08, 0.5
 # At full PWM for longer than the run-up takes, a side that gives less than this share is weak.
 _FULL_PWM_RATIO, _RUN_UP_S, _WEAK_S, _WEAK_RATIO = 0.98, 0.4, 1.0, 0.75
-# The same picture while the wheels turn so far.
-_REPEATED_FRAMES, _REPEATED_TURN_RAD = 5, 1.0
+# The same picture while the wheels turn so far; the last is enough where the camera is doubted anyhow.
+_REPEATED_FRAMES, _REPEATED_TURN_RAD, _REPEATED_LEAST_RAD = 5, 1.0, 0.3
 # Each side asked for something else, and each giving what the other is asked for.
 _SWAPPED_ASKED_RAD_S, _SWAPPED_RATIO, _SWAPPED_S = 2.0, 0.5, 0.4
 # No progress: the error has not come down by this for so long, and is not small.
@@ -92,6 +92,7 @@ class Plausibility:
         self._picture: object = None
         self._repeats = 0
         self._counts_at_picture: tuple[int, int] | None = None
+        self._turned_rad = 0.0  # since the picture last changed
         self._least_m = math.inf
         self._least_s = math.nan
 
@@ -101,20 +102,30 @@ class Plausibility:
         counts = (report.sample.counts_left, report.sample.counts_right) if report else None
         if picture is None or picture != self._picture or self._counts_at_picture is None:
             self._picture, self._repeats, self._counts_at_picture = picture, 0, counts
+            self._turned_rad = 0.0
             return
         self._repeats += 1
         if counts is None or self._repeats < _REPEATED_FRAMES:
             return
-        turned_rad = rad_per_count * max(
+        self._turned_rad = rad_per_count * max(
             abs(now - then) for now, then in zip(counts, self._counts_at_picture, strict=True)
         )
-        if turned_rad >= _REPEATED_TURN_RAD:
-            self._react(
-                "frames_repeated",
-                f"camera: frames repeated: the same picture {self._repeats + 1} times while the wheels "
-                f"turned {turned_rad:.2f} rad (limits {_REPEATED_FRAMES + 1} times, "
-                f"{_REPEATED_TURN_RAD:g} rad); camera or its driver hangs",
-            )
+        if self._turned_rad >= _REPEATED_TURN_RAD:
+            self._react("frames_repeated", self._repeated())
+
+    def narrowed(self, fault: RigFault) -> RigFault:
+        """Return what is wrong where camera and wheels disagree: frames that repeat, if they do."""
+        if self._reactions.frames_repeated != "stop" or self._repeats < _REPEATED_FRAMES:
+            return fault
+        stuck = self._turned_rad >= _REPEATED_LEAST_RAD
+        return RigFault(f"{self._repeated()}; {fault}") if stuck else fault
+
+    def _repeated(self) -> str:
+        return (
+            f"camera: frames repeated: the same picture {self._repeats + 1} times while the wheels "
+            f"turned {self._turned_rad:.2f} rad (limits {_REPEATED_FRAMES + 1} times, "
+            f"{_REPEATED_TURN_RAD:g} rad); camera or its driver hangs"
+        )
 
     def check(self, now_s: float, report: WheelReport, pwm_top_counts: int) -> None:
         """Judge the wheels against what was asked of them up to now."""

@@ -17,10 +17,11 @@ from hil.core.registry import in_one_line
 from hil.core.types import PoseMeasurement
 from hil.record.tick_rows import sample_row
 from hil.runs.plausibility import DIAGNOSIS, Plausibility
-from hil.runs.supervision import Supervisor
+from hil.runs.supervision import Disagreement, Supervisor
 from hil.runs.wheel_limits import WheelLimits
 from hil.wire import handshake
 from hil.wire.refusal import refused_set_point
+from vision.rolling import unrolled
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
@@ -279,6 +280,7 @@ class Session:
         waited = False
         while True:
             now_s = rig.now_s()
+            self._supervisor.check_clock(now_s)
             self._take_all(now_s)
             if now_s >= until_s:
                 break
@@ -306,15 +308,17 @@ class Session:
         return True
 
     def _take_all(self, now_s: float) -> None:
-        parts = self._parts
-        for report in parts.link.poll(now_s):
+        link = self._parts.link
+        for report in link.poll(now_s):
             self._report = report
-            parts.estimator.on_wheels(report.sample)
-            if report.round_trip_s == report.round_trip_s:
-                self._uplink_s += _UPLINK_GAIN * (0.5 * report.round_trip_s - self._uplink_s)
-        while (frame := parts.rig.poll_frame()) is not None:
+            self._parts.estimator.on_wheels(report.sample)
+            round_trip_s = report.round_trip_s
+            if not math.isnan(round_trip_s):
+                self._uplink_s += _UPLINK_GAIN * (0.5 * round_trip_s - self._uplink_s)
+        poll_frame = self._parts.rig.poll_frame
+        while (frame := poll_frame()) is not None:
             self._take_frame(frame, now_s)
-        if parts.link.texts_heard != self._texts_noted:
+        if link.texts_heard != self._texts_noted:
             self._note_texts()
 
     def _note_texts(self) -> None:
@@ -331,6 +335,8 @@ class Session:
         A frame whose stamp the camera's clock refuses is recorded and not looked at.
         """
         parts, clock = self._parts, self._parts.camera_clock
+        if frame.note:
+            self._note("camera", frame.note)
         stamped = clock.arrival(frame.t_cam_s, now_s)
         exposure_s = clock.to_host_s(frame.t_cam_s)
         if clock.restarts != self._camera_restarts:
@@ -358,7 +364,11 @@ class Session:
         if self._refusal:
             raise RigFault(f"board: {self._refusal}")
         link = self._parts.link
-        self._supervisor.check(now_s, link, self._report)
+        self._supervisor.check_host(now_s)
+        try:
+            self._supervisor.check(now_s, link, self._report)
+        except Disagreement as fault:
+            raise self._plausibility.narrowed(fault) from None
         if self._report is not None:
             self._plausibility.check(now_s, self._report, link.info.pwm_top_counts)
 
@@ -368,11 +378,10 @@ class Session:
             return frame.pose
         assert frame.image is not None
         before = self._parts.estimator.estimate_at(exposure_s)
-        return self._parts.localiser.locate(
-            frame.image,
-            before.pose if before is not None else None,
-            self._scenario.camera.search_radius_m,
-        )
+        camera = self._scenario.camera
+        predicted = before.pose if before is not None else None
+        seen = self._parts.localiser.locate(frame.image, predicted, camera.search_radius_m)
+        return unrolled(seen, camera, before)
 
     def _estimate(self, t_effect_s: float) -> Estimate:
         """Return the state at the actuation time, inside the fence; else RigFault."""

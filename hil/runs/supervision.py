@@ -24,7 +24,13 @@ _REFUSED_POSES = 3
 _LEAST_SCALE, _MOST_SCALE = 0.2, 3.0
 # Older wheel reports say nothing of what the wheels turn now; 50 come in a second.
 _FRESH_S = 0.1
+# The board stops by itself after so long without a set-point (firmware core, SETPOINT_TIMEOUT).
+_BOARD_WAITS_S = 0.25
 _DISAGREE_WHY = "marks exchanged, picture mirrored, or the robot pushed or held?"
+
+
+class Disagreement(RigFault):
+    """Camera and wheels say different things of the robot's motion."""
 
 
 class Supervisor:
@@ -36,6 +42,25 @@ class Supervisor:
         self._measurement: PoseMeasurement | None = None
         self._outside = 0
         self._refused = 0
+        self._last_tick_s = math.nan
+        self._newest_s = -math.inf
+
+    def check_clock(self, now_s: float) -> None:
+        """Raise RigFault when the host's clock, which must never, has gone back; once for each time."""
+        back_s, self._newest_s = self._newest_s - now_s, now_s
+        if back_s > 0.0:
+            raise RigFault(
+                f"host: its clock went back by {back_s:.3f} s; nothing can be timed by it"
+            )
+
+    def check_host(self, now_s: float) -> None:
+        """Raise RigFault when the host itself was away for longer than the board waits for it."""
+        away_s, self._last_tick_s = now_s - self._last_tick_s, now_s
+        if away_s > _BOARD_WAITS_S:
+            raise RigFault(
+                f"host: {away_s:.2f} s between two ticks (limit {_BOARD_WAITS_S:g} s: the board stops by "
+                "itself then); process stopped, machine suspended or overloaded, or its clock stepped"
+            )
 
     def saw(self, exposure_s: float, measurement: PoseMeasurement) -> None:
         """Take what the localiser said of a frame, after the estimator was given it."""
@@ -50,7 +75,8 @@ class Supervisor:
     def check(self, now_s: float, link: BoardLink, report: WheelReport | None) -> None:
         """Raise RigFault when board, link or camera no longer answer for the robot."""
         if not link.armed:
-            raise RigFault(f"board: left ARMED by itself: {link.state_name}")
+            anew = "; it has started anew: reset, brown-out or watchdog" if link.disarmed else ""
+            raise RigFault(f"board: left ARMED by itself: {link.state_name}{anew}")
         silent_s = now_s - (report.t_arrival_s if report else -math.inf)
         limit_s = self._safety.link_lost_s
         if silent_s > limit_s:
@@ -74,7 +100,7 @@ class Supervisor:
         duration = f"for {lost_s:.2f} s (limit {limit_s:g} s)"
         if self._refused >= _REFUSED_POSES:
             x_m, y_m, turn_rad = self._estimator.refused
-            raise RigFault(
+            raise Disagreement(
                 f"camera and wheels disagree: robot not seen where the wheels take it {duration}: "
                 f"{self._refused} poses refused, the last one {math.hypot(x_m, y_m):.3f} m and "
                 f"{math.degrees(turn_rad):.0f} deg off; {_DISAGREE_WHY}"
@@ -86,7 +112,7 @@ class Supervisor:
         """Raise RigFault when poses are believed only because the wheels no longer count."""
         for seen, unit in zip(self._estimator.scales, ("m", "rad"), strict=True):
             if not _LEAST_SCALE <= seen <= _MOST_SCALE:
-                raise RigFault(
+                raise Disagreement(
                     f"camera and wheels disagree: {seen:.2f} {unit} seen for each {unit} that the "
                     f"wheels turn (limits {_LEAST_SCALE:g} to {_MOST_SCALE:g} {unit}); "
                     f"{_DISAGREE_WHY}"

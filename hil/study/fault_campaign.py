@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import multiprocessing
 from collections.abc import Callable, Iterable, Sequence
@@ -10,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from hil.core.errors import BadInput
-from hil.study.fault_matrix import Cell, fault_free, run_cell
+from hil.study.fault_free import MOST_RATIO, fault_free, most_ratio
+from hil.study.fault_matrix import Cell, cells, run_cell
 
-CELLS = "cells.jsonl"
+CELLS, FAULT_FREE = "cells.jsonl", "fault_free.jsonl"
 Key = tuple[str, str, str]
 
 
@@ -41,14 +43,43 @@ def run_matrix(
     return [done[key] for key in keys]
 
 
-def run_fault_free(count: int, seed: int, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """Return how many of so many runs without a fault were stopped or diagnosed, and which."""
-    said = []
-    for number, text in enumerate(_each(fault_free, range(seed, seed + count)), start=1):
-        progress(number, count)
-        if text:
-            said.append(text)
-    return {"runs": count, "alarms": len(said), "said": sorted(said)}
+def finished(folder: Path, seed: int) -> list[Key]:
+    """Return the cells of the matrix that a folder has, in their order."""
+    done = _done(folder / CELLS, seed)
+    return [key for key in cells() if key in done]
+
+
+def finished_free(folder: Path, seed: int) -> list[int]:
+    """Return the seeds of the runs without a fault that a folder has, from `seed` on without a gap."""
+    done = {int(tree["seed"]) for tree in _lines(folder / FAULT_FREE, ("seed", "said"))}
+    return list(itertools.takewhile(done.__contains__, itertools.count(seed)))
+
+
+def run_fault_free(
+    count: int, seed: int, folder: Path, progress: Callable[[int, int], None]
+) -> dict[str, Any]:
+    """Return how many of so many runs without a fault were stopped or diagnosed, and which.
+
+    Each is appended to the folder once it is done, and not done again by the next call.
+    """
+    seeds = range(seed, seed + count)
+    path = folder / FAULT_FREE
+    done = {int(tree["seed"]): str(tree["said"]) for tree in _lines(path, ("seed", "said"))}
+    folder.mkdir(parents=True, exist_ok=True)
+    with path.open("a", encoding="utf-8") as file:
+        for number, said in _each(fault_free, [one for one in seeds if one not in done]):
+            file.write(json.dumps({"seed": number, "said": said}) + "\n")
+            file.flush()
+            done[number] = said
+            progress(sum(one in done for one in seeds), count)
+    told = sorted(done[one] for one in seeds if done[one])
+    return {
+        "runs": count,
+        "alarms": len(told),
+        "most_ratio": most_ratio(len(told), count),
+        "met": len(told) <= MOST_RATIO * count,
+        "said": told,
+    }
 
 
 def _cell(key: tuple[str, str, str, int]) -> Cell:
@@ -66,15 +97,25 @@ def _each(work: Callable[[Any], Any], items: Iterable[Any]) -> Iterable[Any]:
 
 
 def _done(path: Path, seed: int) -> dict[Key, dict[str, Any]]:
-    """Return the whole lines of an earlier call of this seed; a torn last one is left."""
+    """Return the cells of an earlier call of this seed."""
     found: dict[Key, dict[str, Any]] = {}
+    for tree in _lines(path, ("seed", "fault", "instant", "law")):
+        if tree.pop("seed") == seed:
+            found[(tree["fault"], tree["instant"], tree["law"])] = tree
+    return found
+
+
+def _lines(path: Path, keys: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the whole lines of an earlier call; a torn last one is left."""
+    found: list[dict[str, Any]] = []
     if not path.exists():
         return found
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
         try:
             tree = json.loads(line)
-            if tree.pop("seed") == seed:
-                found[(tree["fault"], tree["instant"], tree["law"])] = tree
-        except (ValueError, KeyError, TypeError, AttributeError):
+            if not all(key in tree for key in keys):
+                break
+        except (ValueError, TypeError):
             break
+        found.append(tree)
     return found

@@ -2,43 +2,29 @@
 
 from __future__ import annotations
 
-import statistics
+import os
+import platform
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from contextlib import suppress
+from dataclasses import asdict
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from hil import __version__
+from hil.analysis.speed import Figure, Plan, measure
 from hil.config.link import UART_BAUD
 from hil.config.load import load_scenario
+from hil.record.manifest import collect_versions, git_revision
 from hil.rigs.opening import open_rig
 from hil.runs.execute import RunSpec, execute
 from sim_twin.pil import pil_is_missing
 
 _SCENARIO = "scenario-1"
-
-
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """One speed figure: median, least and largest of `runs` runs; `goal` is what it should reach."""
-
-    name: str
-    unit: str
-    median: float
-    least: float
-    largest: float
-    runs: int
-    goal: str
-
-
-def measure(name: str, unit: str, goal: str, runs: int, once: Callable[[], float]) -> Figure:
-    """Return the figure of `once`, called `runs` times after one call that is not counted."""
-    once()
-    values = sorted(once() for _ in range(runs))
-    return Figure(name, unit, statistics.median(values), values[0], values[-1], runs, goal)
+FORMAT = "hil-bench-1"
 
 
 def real_time_factor(camera: str, *, target: str = "twin", record: bool = True) -> float:
@@ -90,7 +76,7 @@ def help_s() -> float:
 
 def figures(runs: int) -> list[Figure]:
     """Return every figure; some tens of seconds in all. `pil` is left out where it cannot run."""
-    plans: list[tuple[str, str, str, Callable[[], float]]] = [
+    plans: list[Plan] = [
         ("whole loop, rendered camera", "x real time", ">= 10",
          lambda: real_time_factor("rendered")),
         ("whole loop, --camera pose", "x real time", ">= 100",
@@ -107,6 +93,26 @@ def figures(runs: int) -> list[Figure]:
     return [measure(name, unit, goal, runs, once) for name, unit, goal, once in plans]
 
 
-def as_document(found: list[Figure]) -> dict[str, Any]:
-    """Return what `hil bench --json` prints."""
-    return {"figures": [asdict(figure) for figure in found]}
+def as_document(what: str, found: list[Figure]) -> dict[str, Any]:
+    """Return what `hil bench --json` prints: the figures, and what they were measured on."""
+    return {
+        "format": FORMAT,
+        "what": what,
+        "program": f"skid-steer-hil {__version__} {git_revision()}".strip(),
+        "time_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+        "machine": {
+            "processor": _processor(),
+            "cores": os.cpu_count(),
+            "versions": collect_versions(),
+        },
+        "figures": [asdict(figure) for figure in found],
+    }
+
+
+def _processor() -> str:
+    """Return the processor's name as the system gives it."""
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()

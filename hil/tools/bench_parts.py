@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hil.analysis.speed import Figure, Plan, measure
 from hil.config.load import load_scenario
 from hil.control.estimators.geometry import BelievedGeometry
 from hil.control.estimators.making import make_estimator
@@ -19,7 +20,6 @@ from hil.record.schema import SAMPLE_NAMES
 from hil.report.compare import compare_runs
 from hil.report.html import render
 from hil.runs.execute import RunSpec, execute
-from hil.tools.bench import Figure, measure
 from hil.wire import dialect
 from hil.wire.framing import FrameReader
 
@@ -37,7 +37,7 @@ def figures(runs: int) -> list[Figure]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         record = _record(folder / "run")
-        plans: list[tuple[str, str, str, Callable[[], float]]] = [
+        plans: list[Plan] = [
             ("estimator, one tick", "us", "<= 500", estimator_tick_us),
             ("recorder, one row", "us", "<= 20", lambda: recorder_row_us(folder)),
             ("link, one WHEEL_STATE", "us", "", frame_us),

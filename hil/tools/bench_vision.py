@@ -23,6 +23,7 @@ from hil.config.camera import (
     CameraPoseConfig,
     ClutterConfig,
     GlareConfig,
+    MarksConfig,
     RobotLookConfig,
     SceneConfig,
     ShadowEdgeConfig,
@@ -46,7 +47,7 @@ HALF_AXES_M = (0.60, 0.30)
 GROSS_M, GROSS_RAD = 0.02, math.radians(5.0)
 POSES_PER_EXPOSURE = 9
 ACQUIRE_EVERY = 5
-EMPTY_FRAMES_PER_SCENE = 200
+EMPTY_FRAMES_PER_SCENE = 50
 
 RED, GREEN = (0.07, 0.06, 0.62), (0.12, 0.42, 0.08)
 _RED_DISC = ClutterConfig(x_m=0.25, y_m=0.05, colour=RED)
@@ -187,10 +188,11 @@ def _rms(values: list[float]) -> float:
 def clutter(rng: Random) -> tuple[ClutterConfig, ...]:
     """Return a dozen things of the marks' colours and of others: discs, boxes, dark sheets.
 
-    Some discs have the marks' own size, and some lie on a dark sheet as marks do; only two of
-    both colours, at the robot's own distance on dark ground, would be the robot's equal.
+    Some discs have the marks' own size, and some lie on a dark sheet as marks do; a plate carries two
+    marks at the wrong distance. Only two of both colours, at the robot's own distance on dark ground,
+    would be the robot's equal.
     """
-    things: list[ClutterConfig] = []
+    things = list(_nearly_a_robot(rng))
     for _ in range(12):
         colour = rng.choice((RED, GREEN, RED, GREEN, (0.5, 0.2, 0.05), (0.08, 0.5, 0.55)))
         size_m = rng.choice((0.06, rng.uniform(0.02, 0.2)))
@@ -208,6 +210,23 @@ def clutter(rng: Random) -> tuple[ClutterConfig, ...]:
             ClutterConfig(shape=shape, size_m=size, height_m=height_m, colour=colour, **place)
         )
     return tuple(things)
+
+
+def _nearly_a_robot(rng: Random) -> Iterator[ClutterConfig]:
+    """Yield a plate with two marks 10 to 40 % too near to or too far from one another."""
+    marks = MarksConfig()
+    x_m, y_m, theta_rad = rng.uniform(-0.6, 0.6), rng.uniform(-0.4, 0.4), rng.uniform(-3.0, 3.0)
+    ratio = 1.0 + rng.choice((-1.0, 1.0)) * rng.uniform(0.1, 0.4)
+    yield ClutterConfig(
+        shape="box", x_m=x_m, y_m=y_m, theta_rad=theta_rad, size_m=(0.32, 0.16),
+        height_m=marks.height_m - 0.001, colour=(0.05, 0.05, 0.05),
+    )  # fmt: skip
+    for mark in (marks.front, marks.rear):
+        yield ClutterConfig(
+            x_m=x_m + ratio * mark.x_m * math.cos(theta_rad),
+            y_m=y_m + ratio * mark.x_m * math.sin(theta_rad),
+            size_m=(marks.diameter_m,) * 2, height_m=marks.height_m, colour=mark.colour,
+        )  # fmt: skip
 
 
 def empty_scenes(frames: int, progress: Progress | None = None) -> Empty:

@@ -117,6 +117,11 @@ class BoardLink:
         return bool(self.state == dialect.HIL_STATE_ARMED)
 
     @property
+    def disarmed(self) -> bool:
+        """True while the board last said it was disarmed, as it is when it starts."""
+        return bool(self.state == dialect.HIL_STATE_DISARMED)
+
+    @property
     def battery_v(self) -> float:
         """Battery voltage of the last SYS_STATUS; NaN before the first."""
         return self.sys_status.voltage_battery * 1e-3 if self.sys_status else math.nan

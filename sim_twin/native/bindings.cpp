@@ -3,12 +3,14 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/function.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 
 #include "kernel.hpp"
@@ -17,6 +19,7 @@ namespace nb = nanobind;
 using namespace nb::literals;
 
 void bind_render(nb::module_& m);  // render_bind.cpp
+void bind_rig(nb::module_& m);     // rig_bind.cpp
 
 namespace {
 
@@ -71,7 +74,7 @@ void bind_plant(nb::module_& m) {
       .def("reset", &Plant::reset, "x_m"_a, "y_m"_a, "theta_rad"_a)
       .def_prop_rw(
           "state", [](const Plant& p) { return p.state(); },
-          [](Plant& p, const StateVector& x) { p.state() = x; })
+          [](Plant& p, const StateVector& x) { p.changed_state() = x; })
       .def("step",
            [](Plant& p, double h_s, double left, double right, const LoadVector& loads) {
              p.step(h_s, duty(left, right), loads, loads, loads);
@@ -79,10 +82,14 @@ void bind_plant(nb::module_& m) {
            "h_s"_a, "duty_left"_a, "duty_right"_a, "loads"_a)
       .def("run",
            [](Plant& p, std::int64_t steps, double h_s, double left, double right,
-              const LoadVector& loads) {
-             for (std::int64_t i = 0; i < steps; ++i) p.step(h_s, duty(left, right), loads, loads, loads);
+              const std::optional<LoadVector>& loads) {
+             const twin::Drive drive = duty(left, right);
+             for (std::int64_t i = 0; i < steps; ++i) {
+               if (loads) p.step(h_s, drive, *loads, *loads, *loads);
+               else p.step(h_s, drive);
+             }
            },
-           "steps"_a, "h_s"_a, "duty_left"_a, "duty_right"_a, "loads"_a)
+           "steps"_a, "h_s"_a, "duty_left"_a, "duty_right"_a, "loads"_a.none())
       .def("derivative",
            [](const Plant& p, double left, double right, const LoadVector& loads) {
              return p.derivative(p.state(), duty(left, right), loads);
@@ -224,4 +231,5 @@ NB_MODULE(_native, m) {
   bind_plant(m);
   bind_kernel(m);
   bind_render(m);
+  bind_rig(m);
 }

@@ -24,12 +24,14 @@ void Encoder::reset(double angle_rad) {
   pins_ = kGray[count_ & 3];
 }
 
-// A dead channel stays at the level its pin has now; swapped wires exchange the pins.
+// A dead channel stays at the level its pin has now; swapped wires exchange the pins; a disturbance of
+// the wires inverts both.
 std::uint8_t Encoder::level(const FaultState::Side& fault) const {
   std::uint8_t ab = kGray[count_ & 3];
   if (fault.swapped) ab = static_cast<std::uint8_t>(((ab & 1) << 1) | (ab >> 1));
   if (fault.dead_a) ab = static_cast<std::uint8_t>((ab & 0b01) | (pins_ & 0b10));
   if (fault.dead_b) ab = static_cast<std::uint8_t>((ab & 0b10) | (pins_ & 0b01));
+  if (fault.glitch) ab ^= 0b11;
   return ab;
 }
 
@@ -65,6 +67,7 @@ Kernel::Kernel(const PlantParams& params, const KernelOptions& options,
 void Kernel::reset(double x_m, double y_m, double theta_rad) {
   plant_.reset(x_m, y_m, theta_rad);
   for (Encoder& encoder : encoders_) encoder.reset(0.0);
+  slipped_rad_ = {};
   time_us_ = 0;
   begin_us_ = kNever_us;
   outside_from_us_ = outside_until_us_ = 0;
@@ -137,7 +140,7 @@ void Kernel::follow_outside(double h_s) {
   const double charge = plant_.charge_after(h_s, drive_);
   const auto done_us = static_cast<double>(time_us_ + options_.step_us - outside_from_us_);
   const double share = done_us / static_cast<double>(outside_period_us_);
-  StateVector& x = plant_.state();
+  StateVector& x = plant_.changed_state();
   for (int i = 0; i < kStates; ++i) {
     x[i] = share < 1.0 ? outside_from_[i] + share * (outside_to_[i] - outside_from_[i])
                        : outside_to_[i];
@@ -153,8 +156,7 @@ void Kernel::integrate() {
   }
   sag_v_ = 0.0;
   if (disturbances_.empty() || time_us_ < begin_us_) {
-    constexpr LoadVector kNone{};
-    plant_.step(h_s, drive_, kNone, kNone, kNone);
+    plant_.step(h_s, drive_);
     return;
   }
   const double t_s = 1e-6 * static_cast<double>(time_us_ - begin_us_);
@@ -175,19 +177,27 @@ void Kernel::step() {
     follow_reset_line();
   }
   set_drive();
-  integrate();
   const StateVector& x = plant_.state();
+  const double wheel_rad[2] = {x[kWheelL], x[kWheelR]};
+  integrate();
   // Before the encoders, which would count every turn of a wheel that has run away; NaN fails too.
   if (!(std::fabs(x[kOmegaL]) + std::fabs(x[kOmegaR]) < kRunaway_rad_s)) {
     throw std::runtime_error("the simulated robot's state diverges");
   }
   edges_.clear();
   for (int side = 0; side < 2; ++side) {
+    // Nothing comes of a wheel that has not turned while no wire changes.
+    if (faults_.empty() && encoders_[side].stands_at(x[kWheelL + side])) continue;
     const int port = fault_.encoders_exchanged ? 1 - side : side;
-    encoders_[side].move(x[kWheelL + side], t0_us, h_us, fault_.side[side], port, edges_);
+    // The encoder sits on the motor, which turns on where the gear slips.
+    const double moved_rad = x[kWheelL + side] - wheel_rad[side];
+    slipped_rad_[side] += moved_rad * (1.0 / fault_.side[side].grip - 1.0);
+    encoders_[side].move(x[kWheelL + side] + slipped_rad_[side], t0_us, h_us, fault_.side[side], port, edges_);
   }
-  std::stable_sort(edges_.begin(), edges_.end(),
-                   [](const PinEdge& a, const PinEdge& b) { return a.t_us < b.t_us; });
+  if (edges_.size() > 1) {
+    std::stable_sort(edges_.begin(), edges_.end(),
+                     [](const PinEdge& a, const PinEdge& b) { return a.t_us < b.t_us; });
+  }
   for (const PinEdge& edge : edges_) board_->edge(edge);
   time_us_ += options_.step_us;
   battery_v_ = plant_.battery_v(drive_, sag_v_);

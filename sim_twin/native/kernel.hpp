@@ -22,6 +22,8 @@ class Encoder {
   // Appends the edges of a step from t0_us to t0_us + h_us that ends at angle_rad.
   void move(double angle_rad, double t0_us, double h_us, const FaultState::Side& fault, int side,
             std::vector<PinEdge>& edges);
+  // Whether the wheel is where the last move left it.
+  bool stands_at(double angle_rad) const { return angle_rad == angle_rad_; }
   std::uint8_t pins() const { return pins_; }
   std::int64_t true_count() const { return count_; }
 
@@ -104,6 +106,7 @@ class Kernel {
   FaultState fault_;
   Drive drive_;
   std::array<Encoder, 2> encoders_;
+  std::array<double, 2> slipped_rad_{};  // what the motors have turned more than their wheels
   std::vector<PinEdge> edges_;
   std::array<PoseSample, kPoses> poses_{};
   std::int64_t pose_count_ = 0;

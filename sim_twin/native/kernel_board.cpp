@@ -23,14 +23,27 @@ std::uint32_t HostBoard::clock_us(double t_us) const {
   return clock_boot_us_ + static_cast<std::uint32_t>(static_cast<std::int64_t>(own_us));
 }
 
+// When the board's next period begins, on the true clock.
+double HostBoard::next_tick_us() const {
+  const double period_us = hil::TICK_US / (1.0 + 1e-6 * options_.clock_ppm);
+  return boot_us_ + static_cast<double>(ticks_ + 1) * period_us;
+}
+
+void HostBoard::drive(const hil::BoardOutputs& outputs) {
+  outputs_ = outputs;
+  duty_[0] = static_cast<double>(outputs.pwm_left) / hil::PWM_TOP;
+  duty_[1] = static_cast<double>(outputs.pwm_right) / hil::PWM_TOP;
+}
+
 void HostBoard::set_reset(bool held, std::int64_t t_us, const std::uint8_t pins[2]) {
   held_ = held;
-  outputs_ = {};
+  drive({});
   if (held) return;
   clock_boot_us_ = t_us == 0 ? options_.clock_start_us : 0;  // switched on before the run began
   boot_us_ = static_cast<double>(t_us);
   uart_free_us_ = boot_us_;
   ticks_ = 0;
+  next_us_ = next_tick_us();
   edges_.clear();
   edges_done_ = 0;
   hil::board_init(board_);
@@ -83,7 +96,9 @@ void HostBoard::tick(double t_us, double battery_v) {
   inputs.counts_right = encoder_[1].counts;
   inputs.encoder_faults = static_cast<std::uint16_t>(encoder_[0].illegal + encoder_[1].illegal);
   inputs.battery_mv = static_cast<std::uint16_t>(1000.0 * kAdcStep_v * std::floor(steps));
-  hil::board_tick(board_, inputs, outputs_);
+  hil::BoardOutputs outputs = outputs_;
+  hil::board_tick(board_, inputs, outputs);
+  drive(outputs);
   hil::StoredByte byte{};
   if (hil::board_store(board_, byte)) eeprom_[byte.address] = byte.value;
   hil::board_slack(board_);
@@ -92,24 +107,15 @@ void HostBoard::tick(double t_us, double battery_v) {
 
 void HostBoard::advance_to(std::int64_t t_us, double battery_v) {
   const auto until_us = static_cast<double>(t_us);
-  if (!held_) {
-    const double period_us = hil::TICK_US / (1.0 + 1e-6 * options_.clock_ppm);
-    double next_us = boot_us_ + static_cast<double>(ticks_ + 1) * period_us;
-    while (next_us <= until_us) {
-      catch_up(next_us);
-      tick(next_us, battery_v);
-      ++ticks_;
-      next_us = boot_us_ + static_cast<double>(ticks_ + 1) * period_us;
-    }
+  while (!held_ && next_us_ <= until_us) {
+    catch_up(next_us_);
+    tick(next_us_, battery_v);
+    ++ticks_;
+    next_us_ = next_tick_us();
   }
   catch_up(until_us);
   edges_.clear();
   edges_done_ = 0;
-}
-
-double HostBoard::duty(int side) const {
-  const std::int16_t pwm = side == 0 ? outputs_.pwm_left : outputs_.pwm_right;
-  return static_cast<double>(pwm) / hil::PWM_TOP;
 }
 
 }  // namespace twin

@@ -56,10 +56,12 @@ class HostBoard final : public BoardSide {
   void edge(const PinEdge& edge) override { edges_.push_back(edge); }
   void receive(std::int64_t t_us, std::string bytes) override;
   void advance_to(std::int64_t t_us, double battery_v) override;
-  double duty(int side) const override;
+  double duty(int side) const override { return duty_[side]; }
 
  private:
   std::uint32_t clock_us(double t_us) const;
+  double next_tick_us() const;
+  void drive(const hil::BoardOutputs& outputs);
   void catch_up(double t_us);   // edges and received bytes up to t_us
   void tick(double t_us, double battery_v);
   void transmit(double t_us);
@@ -68,6 +70,8 @@ class HostBoard final : public BoardSide {
   hil::Board board_{};
   hil::Quadrature encoder_[2]{};
   hil::BoardOutputs outputs_{};
+  double duty_[2] = {0.0, 0.0};     // what the outputs are to the motors
+  double next_us_ = 0.0;            // of the next period
   std::vector<PinEdge> edges_;
   std::size_t edges_done_ = 0;
   std::deque<Chunk> received_;

@@ -55,6 +55,9 @@ double zone_weight(const Disturbance& d, double x_m, double y_m) {
   return 0.5 + 0.5 * inside_m / std::sqrt(inside_m * inside_m + kEdge_m * kEdge_m);
 }
 
+// Noise on an encoder's wires: a pulse on both channels in the first 0.1 ms of each millisecond.
+bool glitches(double t_s) { return std::fmod(t_s + 1e-9, 1e-3) < 1e-4; }
+
 }  // namespace
 
 double disturbance_value(const Disturbance& d, double t_s, double x_m, double y_m) {
@@ -83,6 +86,8 @@ FaultState Faults::at(double t_s) const {
         case FaultKind::kDeadChannelA: side.dead_a = true; break;
         case FaultKind::kDeadChannelB: side.dead_b = true; break;
         case FaultKind::kSwappedPhases: side.swapped = true; break;
+        case FaultKind::kEncoderNoise: side.glitch = glitches(t_s); break;
+        case FaultKind::kGearSlip: side.grip *= fault.strength; break;
         case FaultKind::kMotorReversed: side.reversed = true; break;
         case FaultKind::kMotorStuck: side.stuck = true; break;
         case FaultKind::kMotorWeak: side.strength *= fault.strength; break;

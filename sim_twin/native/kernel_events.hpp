@@ -44,6 +44,8 @@ class Disturbances {
   X(kDeadChannelA, "dead_channel_a")    \
   X(kDeadChannelB, "dead_channel_b")    \
   X(kSwappedPhases, "swapped_phases")   \
+  X(kEncoderNoise, "encoder_noise")     \
+  X(kGearSlip, "gear_slip")             \
   X(kMotorReversed, "motor_reversed")   \
   X(kMotorStuck, "motor_stuck")         \
   X(kMotorWeak, "motor_weak")           \
@@ -60,14 +62,16 @@ struct Fault {
   FaultKind kind = FaultKind::kDeadEncoder;
   bool left = true, right = true;
   double start_s = 0.0, end_s = 0.0;
-  double strength = 1.0;  // of a weak motor: share of the voltage that reaches it
+  double strength = 1.0;  // weak motor: share of the voltage; slipping gear: share of the turn
 };
 
 // What is wrong at one instant.
 struct FaultState {
   struct Side {
     bool dead_a = false, dead_b = false, swapped = false, reversed = false, stuck = false;
+    bool glitch = false;  // a disturbance of both channels' wires: their levels read inverted
     double strength = 1.0;
+    double grip = 1.0;  // share of the motor's turn that reaches the wheel
   };
   Side side[2];
   bool board_in_reset = false;

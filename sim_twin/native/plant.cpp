@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace twin {
 namespace {
@@ -9,6 +10,13 @@ namespace {
 constexpr double kGravity = 9.81;  // m/s^2
 // Slope of a brake's torque through rest, as stiff as a jam of the gears (kernel.cpp).
 constexpr double kStiffest_n_m_s_rad = 12.0;
+
+// What is left of a speed or a current that dies away: far below anything that acts on the rest, and
+// still far above the numbers that processors take a hundred times longer for, squared too. Without an
+// end a robot at rest would be computed in those for ever.
+constexpr double kNothing = 1e-100;
+
+inline Pair settled(Pair v) { return magnitude(v) < kNothing ? Pair{0.0, 0.0} : v; }
 
 // Sign with a soft middle: 0.71 at v = v_s, 0.995 at 10 v_s.
 inline Pair soft_sign(Pair v, double v_s) { return v / root(v * v + v_s * v_s); }
@@ -71,6 +79,7 @@ Plant::Derived Plant::derive(const PlantParams& p) {
 
 void Plant::reset(double x_m, double y_m, double theta_rad) {
   x_.fill(0.0);
+  rest_.holds = false;
   x_[kX] = x_m;
   x_[kY] = y_m;
   x_[kTheta] = theta_rad;
@@ -270,6 +279,7 @@ Plant::Acceleration Plant::hanging(const Sides& both) const {
 
 void Plant::step(double h_s, const Drive& drive, const LoadVector& begin,
                  const LoadVector& middle, const LoadVector& end) {
+  rest_.holds = false;
   const PairedState x = paired(x_);
   const Heading at = heading(x_[kTheta]);
   const auto slope = [&](const PairedState& there, const LoadVector& load) {
@@ -287,7 +297,32 @@ void Plant::step(double h_s, const Drive& drive, const LoadVector& begin,
     next[kEta][1] = -p_.d0_m * next[kTurn][1];
     next[kOmega] = rolling(next[kEta][0], next[kTurn][1]);
   }
+  next[kTurn][1] = std::fabs(next[kTurn][1]) < kNothing ? 0.0 : next[kTurn][1];
+  for (const int i : {kEta, kCurrent, kOmega}) next[i] = settled(next[i]);
   x_ = listed(next);
+}
+
+// Whether a step at this drive left everything but the charge as it was, to the bit. The charge acts
+// through duty times voltage alone, which is nothing while both motors are off.
+bool Plant::is_rest(const StateVector& before, const Drive& drive) const {
+  static_assert(kCharge == kStates - 1, "the charge is compared with nothing");
+  if (drive.duty[0] != 0.0 || drive.duty[1] != 0.0 || x_[kOmegaL] != 0.0) return false;
+  return std::memcmp(before.data(), x_.data(), kCharge * sizeof(double)) == 0;
+}
+
+void Plant::step(double h_s, const Drive& drive) {
+  constexpr LoadVector kNone{};
+  if (rest_.holds && rest_.h_s == h_s &&
+      std::memcmp(&rest_.drive, &drive, sizeof drive) == 0) {
+    x_[kCharge] += rest_.charge_change;
+    return;
+  }
+  const StateVector before = x_;
+  step(h_s, drive, kNone, kNone, kNone);
+  if (!is_rest(before, drive)) return;
+  // All four slopes are the same: the current drawn does not change.
+  const double k = -d_.per_charge * draw_a(Pair{x_[kCurrentL], x_[kCurrentR]}, drive);
+  rest_ = {true, h_s, h_s / 6.0 * (k + 2.0 * (k + k) + k), drive};
 }
 
 }  // namespace twin

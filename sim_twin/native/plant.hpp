@@ -107,8 +107,15 @@ class Plant {
   void step(double h_s, const Drive& drive, const LoadVector& begin, const LoadVector& middle,
             const LoadVector& end);
 
+  // The same without loads. A robot that stands stays where it is: only its battery is reckoned then,
+  // with the same result to the bit.
+  void step(double h_s, const Drive& drive);
+
   const StateVector& state() const { return x_; }
-  StateVector& state() { return x_; }
+  StateVector& changed_state() {  // to be written to
+    rest_.holds = false;
+    return x_;
+  }
   double battery_v(const Drive& drive, double sag_v) const;  // at the terminals, now
   double charge_after(double h_s, const Drive& drive) const; // at the current drawn now
   StateVector derivative(const StateVector& x, const Drive& drive, const LoadVector& load) const;
@@ -157,9 +164,17 @@ class Plant {
   Pair castor_drag(const PairedState& x, double grip_ratio, double v_s) const;
   Pair rolling(double eta1, double w) const;  // wheel speeds, or their rates from the body's
 
+  struct Rest {  // a step that changed nothing but the charge
+    bool holds = false;
+    double h_s = 0.0, charge_change = 0.0;
+    Drive drive;
+  };
+  bool is_rest(const StateVector& before, const Drive& drive) const;
+
   PlantParams p_;
   Derived d_;
   StateVector x_{};
+  Rest rest_;
 };
 
 }  // namespace twin

@@ -45,6 +45,34 @@ double pixel_offset(double p, double sigma) {
     return 0.5 * (lo + hi);
 }
 
+// Every pixel of a frame goes through these two: wide registers where the processor has them, found out
+// at run time. Whole numbers, roots and single products have the same bits in any width.
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+#define CAMERA_WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define CAMERA_WIDE
+#endif
+
+CAMERA_WIDE void quantised(const float* dn, int count, float read2, float shot, int16_t* level,
+                           int16_t* sigma) {
+    for (int i = 0; i < count; ++i) {
+        const float value = std::min(std::max(dn[i], 0.0f), DN_MAX);
+        level[i] = static_cast<int16_t>(value * DN_STEPS + 0.5f);
+        sigma[i] = static_cast<int16_t>(std::min(std::sqrt(read2 + shot * value), SIGMA_MAX_DN) *
+                                        (DN_STEPS * 65536.0f / NORMAL_STEPS));
+    }
+}
+
+CAMERA_WIDE void noisy(const int16_t* level, const int16_t* sigma, const int16_t* normal, int count,
+                       uint8_t* out) {
+    constexpr int16_t half = static_cast<int16_t>(DN_STEPS / 2);
+    for (int i = 0; i < count; ++i) {
+        const int16_t noise = static_cast<int16_t>((sigma[i] * normal[i]) >> 16);
+        const int16_t dn = static_cast<int16_t>(static_cast<int16_t>(level[i] + noise + half) >> 6);
+        out[i] = static_cast<uint8_t>(std::clamp<int16_t>(dn, 0, 255));
+    }
+}
+
 }  // namespace
 
 Renderer::Renderer(const View& view, const Scene& scene, const Robot& robot, uint64_t seed)
@@ -84,6 +112,11 @@ Renderer::Renderer(const View& view, const Scene& scene, const Robot& robot, uin
     sample_table();
     noise_bank();
     background();
+}
+
+Renderer::Renderer(const Renderer& other, uint64_t seed) : Renderer(other) {
+    seed_ = seed;
+    noise_bank();
 }
 
 // What an edge between any two ids is.
@@ -263,23 +296,12 @@ void Renderer::composite() {
 }
 
 void Renderer::quantise(const float* dn, int count, int16_t* level, int16_t* sigma) const {
-    const float read2 = scene_.read_noise * scene_.read_noise, shot = scene_.dn_per_electron;
-    for (int i = 0; i < count; ++i) {
-        const float value = std::min(std::max(dn[i], 0.0f), DN_MAX);
-        level[i] = static_cast<int16_t>(value * DN_STEPS + 0.5f);
-        sigma[i] = static_cast<int16_t>(std::min(std::sqrt(read2 + shot * value), SIGMA_MAX_DN) *
-                                        (DN_STEPS * 65536.0f / NORMAL_STEPS));
-    }
+    quantised(dn, count, scene_.read_noise * scene_.read_noise, scene_.dn_per_electron, level, sigma);
 }
 
 void Renderer::emit(const int16_t* level, const int16_t* sigma, const int16_t* normal, int count,
                     uint8_t* out) const {
-    constexpr int16_t half = static_cast<int16_t>(DN_STEPS / 2);
-    for (int i = 0; i < count; ++i) {
-        const int16_t noise = static_cast<int16_t>((sigma[i] * normal[i]) >> 16);
-        const int16_t dn = static_cast<int16_t>(static_cast<int16_t>(level[i] + noise + half) >> 6);
-        out[i] = static_cast<uint8_t>(std::clamp<int16_t>(dn, 0, 255));
-    }
+    noisy(level, sigma, normal, count, out);
 }
 
 // The poses at the middle of each time slot of the exposure. They are rounded to a grid far below

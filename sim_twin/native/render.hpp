@@ -103,6 +103,8 @@ struct Sample {
 class Renderer {
 public:
     Renderer(const View& view, const Scene& scene, const Robot& robot, uint64_t seed);
+    // The same scene with other noise: nothing but the noise is worked out anew.
+    Renderer(const Renderer& other, uint64_t seed);
 
     // Writes the frame `index`, (height, width, 3); poses are (x, y, theta), evenly spaced from
     // the start to the end of the exposure.

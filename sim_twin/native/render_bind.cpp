@@ -5,7 +5,9 @@
 #include <nanobind/stl/vector.h>
 
 #include <memory>
+#include <mutex>
 #include <stdexcept>
+#include <utility>
 
 #include "render.hpp"
 
@@ -20,13 +22,53 @@ std::vector<float> flat(const FloatImage& image) {
     return {image.data(), image.data() + image.size()};
 }
 
+// Memory of frames that nobody holds any more, for the next ones: fresh memory of that size has to be
+// cleared by the system each time, which takes as long as drawing.
+class Sheets {
+public:
+    using Pixels = std::unique_ptr<uint8_t[]>;
+
+    Pixels take(size_t size) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (kept_.empty()) return Pixels(new uint8_t[size]);
+        Pixels out = std::move(kept_.back());
+        kept_.pop_back();
+        return out;
+    }
+
+    void give(Pixels pixels) noexcept {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (kept_.size() < kept_.capacity()) kept_.push_back(std::move(pixels));
+    }
+
+    Sheets() { kept_.reserve(MOST_KEPT); }
+
+private:
+    static constexpr size_t MOST_KEPT = 4;
+    std::mutex mutex_;  // an array may die in any thread
+    std::vector<Pixels> kept_;
+};
+
+// One frame's memory, which goes back when the array on it dies.
+struct Sheet {
+    std::shared_ptr<Sheets> sheets;
+    Sheets::Pixels pixels;
+
+    Sheet(std::shared_ptr<Sheets> from, Sheets::Pixels taken)
+        : sheets(std::move(from)), pixels(std::move(taken)) {}
+    ~Sheet() { sheets->give(std::move(pixels)); }
+};
+
 // A renderer that knows its own size, so that Python gets whole arrays.
 struct Bound {
     camera::View view;
     camera::Renderer renderer;
+    std::shared_ptr<Sheets> sheets = std::make_shared<Sheets>();
 
     Bound(const camera::View& v, const camera::Scene& s, const camera::Robot& r, uint64_t seed)
         : view(checked(v, s)), renderer(v, s, r, seed) {}
+
+    Bound(const Bound& other, uint64_t seed) : view(other.view), renderer(other.renderer, seed) {}
 
     static const camera::View& checked(const camera::View& v, const camera::Scene& s) {
         const size_t pixels = static_cast<size_t>(v.width) * v.height;
@@ -39,10 +81,12 @@ struct Bound {
 
     Image make(uint64_t index, const std::vector<std::array<double, 3>>& poses) {
         const size_t height = view.height, width = view.width;
-        auto data = std::make_unique<uint8_t[]>(height * width * 3);
-        renderer.make(index, poses, data.get());
-        nb::capsule owner(data.get(), [](void* p) noexcept { delete[] static_cast<uint8_t*>(p); });
-        return Image(data.release(), {height, width, 3}, owner);
+        auto sheet = std::make_unique<Sheet>(sheets, sheets->take(height * width * 3));
+        uint8_t* const pixels = sheet->pixels.get();
+        renderer.make(index, poses, pixels);
+        nb::capsule owner(sheet.get(), [](void* p) noexcept { delete static_cast<Sheet*>(p); });
+        sheet.release();
+        return Image(pixels, {height, width, 3}, owner);
     }
 };
 
@@ -118,6 +162,9 @@ void bind_render(nb::module_& m) {
     nb::class_<Bound>(m, "Renderer")
         .def(nb::init<const View&, const Scene&, const Robot&, uint64_t>(), nb::arg("view"),
              nb::arg("scene"), nb::arg("robot"), nb::arg("seed"))
+        .def("reseeded", [](const Bound& bound, uint64_t seed) { return new Bound(bound, seed); },
+             nb::rv_policy::take_ownership, nb::arg("seed"),
+             "The same scene with the noise of another seed.")
         .def("make", &Bound::make, nb::arg("index"), nb::arg("poses"),
              "The frame `index`, (height, width, 3) BGR, with the robot at `poses` (x, y, theta)\n"
              "from the start to the end of the exposure; without poses the empty scene.");

@@ -2,6 +2,7 @@
 
 import re
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -150,3 +151,14 @@ def test_a_picture_without_a_board_has_no_hint():
         not_seen_hint(parse_board("charuco:8x6:30:22"), np.full((600, 800, 3), 99, np.uint8)) == ""
     )
     assert parse_board("charuco:8x5:30:22").other_print() is None
+
+
+@pytest.mark.parametrize("kernel", [(1, 15), (15, 1), (9, 9)])
+def test_a_blurred_picture_is_named(kernel):
+    """A photograph blurred by 15 px along rows, along columns, or all round: said, with how much."""
+    photo = cv2.imread(str(Path(__file__).parents[1] / "data/chessboard/left01.jpg"))
+    board = parse_board("charuco:8x6:30:22")
+    assert not_seen_hint(board, photo) == ""
+    blurred = cv2.blur(photo, kernel) if 1 in kernel else cv2.GaussianBlur(photo, (0, 0), 4.0)
+    hint = not_seen_hint(board, blurred)
+    assert re.search(r"the pictures are blurred \(edges 1\d px wide", hint), hint

@@ -1,5 +1,6 @@
 """Frame sources: stamps, stalls, stale frames, files that are damaged or cut off."""
 
+import re
 import threading
 import time
 
@@ -12,6 +13,7 @@ import pytest
 from hil.core.errors import BadInput, RigFault
 from hil.rigs.frames import open_source
 from vision import cv_compat
+from vision.camera_watch import FrameWatch
 from vision.sources import CameraControls, ImageFolder, LiveCamera, VideoFile
 
 pytestmark = pytest.mark.realtime
@@ -32,6 +34,7 @@ class FakeCapture:
             cv2.CAP_PROP_WB_TEMPERATURE: 4100.0,
         }
         self.refused = {cv2.CAP_PROP_AUTOFOCUS}
+        self.dropped = {cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT}
         self.stamps, self.opened = stamps, opened
         self.block, self.gone = threading.Event(), threading.Event()
         self.count, self.queued, self.stamp_s, self.released = 0, 0, 0.0, False
@@ -67,7 +70,7 @@ class FakeCapture:
     def set(self, key, value):
         if key in self.refused:
             return False
-        if key not in {cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT}:
+        if key not in self.dropped:
             self.values[key] = value
         return True
 
@@ -138,6 +141,92 @@ def test_exposure_gain_and_white_balance_are_locked():
     assert camera.unlocked == ["focus"]
     assert capture.values[cv2.CAP_PROP_AUTO_EXPOSURE] == 1.0
     assert capture.values[cv2.CAP_PROP_AUTO_WB] == 0.0
+
+
+def test_what_a_driver_drops_without_a_word_is_said_with_the_first_frame():
+    """Exposure asked at 80, 157 stays in force; YUYV comes where MJPG was asked for."""
+    capture = FakeCapture()
+    capture.values[cv2.CAP_PROP_FOURCC] = float(cv2.VideoWriter.fourcc(*"YUYV"))
+    capture.dropped = {cv2.CAP_PROP_EXPOSURE, cv2.CAP_PROP_FOURCC}
+    camera = LiveCamera(0, CameraControls(exposure=80.0, focus=3.0), capture)
+    first, second = take(camera, 2)
+    camera.close()
+    assert camera.refused == [("exposure", 80.0, 157.0)]
+    assert first.note == (
+        "exposure: 80 asked for, 157 in force; focus: cannot be set;"
+        " pictures come as YUYV, MJPG asked for"
+    )
+    assert second.note == ""
+    raw = LiveCamera(0, CameraControls(raw=True), FakeCapture())
+    assert take(raw, 1)[0].note == "focus: left to the camera's automatics"
+    raw.close()
+
+
+def test_a_frame_that_comes_twice_is_left_out_and_named():
+    """Every third picture is the one before: they do not come through, and the third is told of."""
+    watch = FrameWatch(50.0)
+    rng = np.random.default_rng(3)
+    picture, new, told = None, [], []
+    for k in range(12):
+        if k % 3 != 2:
+            picture = rng.integers(0, 255, (48, 64, 3), np.uint8)
+        new.append(watch.take(k * PERIOD_S, k * PERIOD_S + 0.004, picture))
+        told.append(watch.said())
+    assert new == [True, True, False] * 4
+    assert watch.repeated == 4
+    assert [text for text in told if text] == [
+        "3 of its last 9 frames are the one before once more"
+    ]
+
+
+@pytest.mark.parametrize(("rate_hz", "age_s", "told"), [
+    (50.0, 0.004, ""),
+    (50.0, 0.09, "frames are 90 ms old when they arrive, 4.5 periods: its driver keeps a queue"),
+    (25.0, 0.004, "gives 25.0 Hz, 50 Hz were asked for; a shorter exposure or a smaller frame may help"),
+])  # fmt: skip
+def test_rate_and_age_are_measured_and_named_once(rate_hz, age_s, told):
+    """120 frames; what is as it should be is not spoken of."""
+    watch, rng = FrameWatch(50.0), np.random.default_rng(4)
+    said = []
+    for k in range(120):
+        stamp_s = k / rate_hz
+        picture = rng.integers(0, 255, (48, 64, 3), np.uint8)
+        assert watch.take(stamp_s, stamp_s + age_s, picture)
+        said.append(watch.said())
+    assert [text for text in said if text] == ([told] if told else [])
+    assert watch.rate_hz == pytest.approx(rate_hz)
+    assert watch.age_s == pytest.approx(age_s)
+
+
+def test_a_camera_that_freezes_on_one_picture_is_a_fault():
+    """Stamps run on, the picture does not: after 0.2 s no new frame has come, and it says why."""
+    capture = FakeCapture()
+    camera = LiveCamera(0, capture=capture)
+    take(camera, 3)
+    capture.retrieve = lambda: (True, np.full((48, 64, 3), 7, np.uint8))
+    with pytest.raises(RigFault, match=r"no frame for 0\.2.* the one before once more"):
+        take(camera, 40)
+    capture.gone.set()
+    camera.close()
+
+
+def test_a_camera_unplugged_and_back_goes_on_where_that_is_allowed():
+    """Gone after three frames and back at the second try: numbers go on, controls are set anew."""
+    first, second = FakeCapture(), FakeCapture()
+    tries = [FakeCapture(opened=False), second]
+    camera = LiveCamera(
+        0, CameraControls(exposure=80.0), first, patience_s=5.0, opener=lambda _: tries.pop(0)
+    )
+    before = take(camera, 3)
+    first.gone.set()
+    after = take(camera, 8)
+    camera.close()
+    assert first.released
+    assert second.values[cv2.CAP_PROP_EXPOSURE] == 80.0
+    indices = [frame.index for frame in before + after]
+    assert indices == list(range(len(indices)))
+    said = " ".join(frame.note for frame in after)
+    assert re.search(r"gone for \d\.\d s after frame \d+", said)
 
 
 def test_a_camera_that_cannot_do_what_is_asked():

@@ -89,7 +89,7 @@ def _strike(kind: str, process: subprocess.Popen[str], folder: Path, rng: random
     if kind == "folder gone":
         while process.poll() is None and not (folder / "manifest.json").exists():
             time.sleep(0.005)
-        time.sleep(rng.uniform(0.0, 0.5))
+        time.sleep(rng.uniform(0.0, WHOLE_S))  # while it is closed too
         shutil.rmtree(folder, ignore_errors=True)
     elif kind == "twice":
         number = rng.choice(SIGNALS)

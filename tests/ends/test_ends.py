@@ -9,12 +9,14 @@ import shutil
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from hil.config.load import load_scenario
 from hil.core.errors import RecordFault, Stopped
+from hil.record import recorder
 from hil.record.reader import read_run
 from hil.record.recorder import Recorder
 from hil.replays.exact import replay
@@ -163,6 +165,23 @@ class Mine:
 
 hil.estimator("mine")(Mine)
 """
+
+
+@pytest.mark.parametrize("step", ["read_journal", "read_events", "read_pictures", "replace_file"])
+def test_a_folder_that_goes_away_while_the_record_is_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str
+) -> None:
+    """Whatever finds it gone, and whatever that raises, it is told as what it is."""
+    then = getattr(recorder, step)
+
+    def gone(*arguments: object) -> object:
+        shutil.rmtree(tmp_path / "run", ignore_errors=True)
+        return then(*arguments)
+
+    monkeypatch.setattr(recorder, step, gone)
+    with pytest.raises(RecordFault, match="cannot be written any more"):
+        execute(replace(spec(tmp_path / "run"), rerun=True))
+    assert not (tmp_path / "run").exists()
 
 
 def test_an_estimator_of_ones_own_that_raises_is_named_with_its_line(tmp_path: Path) -> None:

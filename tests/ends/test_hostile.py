@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from hil.core.errors import BadInput
 from hil.core.files import LOG_BYTES, TEXT_BYTES
 from hil.record.log_import import import_log
 from hil.record.reader import read_run
+from hil.record.rrd import write_rrd
 from hil.record.tlog import read_tlog
 from hil.report.compare import compare_runs
 from hil.report.csv_table import write_csv
@@ -106,6 +108,18 @@ def test_the_report_holds_no_script_and_no_control_character(hostile: Path) -> N
     assert "<script>alert" not in page
     assert "\x1b" not in page
     assert "\x07" not in page
+
+
+def test_the_viewer_is_given_no_control_character(hostile: Path, tmp_path: Path) -> None:
+    """Names and events of the Rerun file are text that shows."""
+    run = read_run(hostile)
+    scenario = run.manifest.scenario | {"name": MARKUP + CONTROL}
+    named = replace(run, manifest=run.manifest.model_copy(update={"scenario": scenario}))
+    write_rrd(tmp_path / "run.rrd", [named])
+    data = (tmp_path / "run.rrd").read_bytes()
+    assert b"\x1b[31m" not in data
+    assert b"\x1b]0;" not in data
+    assert b"\\x1b[31mred" in data
 
 
 def test_a_terminal_is_shown_what_was_typed(hostile: Path) -> None:

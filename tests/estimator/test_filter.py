@@ -2,11 +2,14 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from hil.config.control import EstimatorConfig
 from hil.control.estimators._fused import PoseFilter, wrap_pi
-from hil.control.estimators.fused import assumptions
+from hil.control.estimators.fused import Fused, assumptions
+from hil.control.estimators.geometry import BelievedGeometry
+from hil.core.types import Pose, PoseMeasurement
 from hil.core.types import wrap_pi as wrap_pi_of_types
 
 CONFIG = EstimatorConfig(
@@ -113,3 +116,38 @@ def test_angles_are_wrapped_as_everywhere_else(angle):
 def test_an_angle_that_is_no_number_stays_none():
     """NaN and both infinities give NaN."""
     assert all(math.isnan(wrap_pi(angle)) for angle in (math.nan, math.inf, -math.inf))
+
+
+def test_a_whole_covariance_is_the_textbook_update():
+    """Errors of x, y and theta that go together: x + K y and (1 - K H) P of numpy, to 1e-12."""
+    filter_ = placed(0.1, -0.2, 0.7)
+    filter_.move(0.1, 0.03, 0.2, 0.03, 0.2)
+    x, P = np.array(filter_.x), np.array(filter_.P)
+    R = np.array([[4e-6, 1.5e-6, 2e-6], [1.5e-6, 2e-6, -1e-6], [2e-6, -1e-6, 9e-6]])
+    theta, d0 = x[2], x[5]
+    H = np.zeros((3, 6))
+    H[0, 0] = H[1, 1] = H[2, 2] = 1.0
+    H[0, 2], H[1, 2] = d0 * math.sin(theta), -d0 * math.cos(theta)
+    H[0, 5], H[1, 5] = -math.cos(theta), -math.sin(theta)
+    seen = np.array((0.002, -0.001, 0.01))
+    gain = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
+    excess = (R - np.diag((3e-6, 3e-6, 9e-6)))[np.triu_indices(3)]
+    assert filter_.correct(tuple(seen), 3e-6, 9e-6, gate=16.3, excess=excess.tolist())
+    assert np.abs(np.array(filter_.x) - (x + gain @ seen)).max() < 1e-12
+    assert np.abs(np.array(filter_.P) - (np.eye(6) - gain @ H) @ P).max() < 1e-12
+
+
+def test_an_estimator_believes_a_pose_across_the_blur_more_than_along_it():
+    """A second pose 1 mm off in x and y, doubtful along x alone: y follows it, x hardly does."""
+    fused = Fused(CONFIG, BelievedGeometry(0.0482, 0.2166, 0.03, 1920))
+    sharp = (1e-7, 0.0, 0.0, 1e-7, 0.0, 1e-5)
+    long_in_x = (4e-6, 0.0, 0.0, 1e-8, 0.0, 1e-5)
+    for t_s, at_m, claim in ((0.0, 0.0, sharp), (0.03, 1e-3, long_in_x)):
+        sigma_xy_m = math.sqrt(0.5 * (claim[0] + claim[3]))
+        seen = PoseMeasurement(
+            Pose(at_m, at_m, 0.0), 1.0, "", sigma_xy_m, math.sqrt(claim[5]), covariance=claim
+        )
+        fused.on_pose(t_s, seen)
+    pose = fused.estimate_at(0.04).pose
+    assert pose.x_m < 0.3e-3
+    assert pose.y_m > 0.8e-3

@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hil.board import codegen
 from hil.wire import dialect
 from hil.wire.framing import FrameWriter
+from tests.firmware import hostile
 from tests.firmware.bench import BoardBench
-
-FIRMWARE = codegen.ROOT / "firmware_arduino"
-SANITIZERS = (
-    "-fsanitize=address,undefined,float-cast-overflow",
-    "-fno-sanitize-recover=all",
-)
 
 
 def honest_frames() -> list[bytes]:
@@ -93,15 +86,5 @@ def test_a_frame_cut_short_costs_at_most_what_follows_directly(cut):
 @pytest.mark.skipif(shutil.which("c++") is None, reason="needs a C++ compiler on the PATH")
 def test_a_hundred_thousand_hostile_frames_under_sanitizers(tmp_path: Path):
     """The core built with ASan and UBSan: random, truncated, flipped, oversized, replayed frames."""
-    program = tmp_path / "hostile_bytes"
-    sources = [
-        FIRMWARE / "host" / "hostile_bytes.cpp",
-        *sorted((FIRMWARE / "src/core").glob("*.cpp")),
-    ]
-    warnings = ["-Wall", "-Wextra", "-Werror"]
-    compiler = ["c++", "-std=c++17", "-O0", "-ffp-contract=off", *warnings, *SANITIZERS]
-    include = f"-I{FIRMWARE / 'src'}"
-    subprocess.run([*compiler, include, *sources, "-o", program], check=True)
-    done = subprocess.run([program, "50000", "1"], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "50000 frames unarmed, 50000 armed: no fault" in done.stdout
+    hostile.build(tmp_path / "hostile_bytes")
+    assert hostile.throw(tmp_path / "hostile_bytes", 50_000, 1) == ""

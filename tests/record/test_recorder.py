@@ -23,6 +23,7 @@ from hil.record.manifest import read_manifest
 from hil.record.reader import picture_name, read_pictures, read_run
 from hil.record.recorder import Recorder
 from hil.record.schema import FRAME_NAMES, SAMPLE_COLUMNS, SAMPLE_NAMES, trace_row
+from hil.record.tick_rows import COVARIANCE
 from tests.record.synthetic import frame_row, image_of, make_run, manifest, rows
 
 
@@ -126,6 +127,7 @@ def test_frames_cut_anywhere_never_hide_the_samples(journal, tmp_path):
 KILLED = """
 import itertools, pathlib, sys
 from hil.record.recorder import Recorder
+from hil.record.tick_rows import COVARIANCE
 from tests.record.synthetic import manifest, rows
 recorder = Recorder(pathlib.Path(sys.argv[1]), manifest())
 base = rows("asg-ism", 1)
@@ -308,3 +310,16 @@ def test_manifest_of_a_record_without_a_close(journal):
     """From its first instant a record says which run it is."""
     found = read_manifest(journal[0])
     assert (found.outer, found.seed, found.scenario_name) == ("asg-ism", 1, "scenario-1")
+
+
+def test_a_record_made_before_covariances_were_kept_still_has_its_frames(tmp_path):
+    """Without their columns the frames are read all the same, each covariance NaN."""
+    whole = make_run(tmp_path / "run")
+    file = tmp_path / "run" / "frames.parquet"
+    table = pq.read_table(file)
+    assert set(COVARIANCE) <= set(table.column_names)
+    pq.write_table(table.drop_columns(list(COVARIANCE)), file)
+    old = read_run(tmp_path / "run").frames
+    assert np.array_equal(old["x_m"], whole.frames["x_m"])
+    assert all(np.isnan(old[name]).all() for name in COVARIANCE)
+    assert len(old["cov_xx_m2"]) == len(old["x_m"]) > 0

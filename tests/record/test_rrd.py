@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import subprocess
 import sys
 
@@ -39,6 +40,20 @@ def test_recorder_writes_a_valid_file_with_everything(runs):
     for plot in PLOTS:
         there = f"/scenario-1/pid/{plot.key}" in text
         assert there is (plot.key != "sliding"), plot.key  # PID has no sliding variable
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.999])
+def test_a_file_that_may_not_grow_is_an_error_and_no_endless_wait(runs, tmp_path, share):
+    """Rerun's own writer waits for ever then; nothing half-written is left."""
+    size = (runs[0].path / "run.rrd").stat().st_size
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (int(share * size), before[1]))
+    try:
+        with pytest.raises(OSError, match="too large"):
+            write_rrd(tmp_path / "run.rrd", runs[:1])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.iterdir())
 
 
 def test_plots_name_columns_of_the_schema():

@@ -83,3 +83,20 @@ def test_scheduler_that_goes_away_is_one_line(one_worker: Any) -> None:
         take()
     assert len(found) >= 2
     assert "\n" not in str(ended.value)
+
+
+@pytest.mark.parametrize(
+    ("address", "told"),
+    [
+        ("tcp://127.0.0.1:8786", False),
+        ("localhost:8786", False),
+        ("tcp://[::1]:8786", False),
+        ("tls://cluster.example:8786", False),
+        ("tcp://192.168.1.7:8786", True),
+        ("cluster.example:8786", True),
+        ("tcp://127.0.0.1.example:8786", True),
+    ],
+)
+def test_a_scheduler_that_others_reach_is_told(address: str, told: bool) -> None:
+    """What is exchanged is code; only this machine's own and checked connections go without a word."""
+    assert bool(cluster.open_to_others(address)) is told

@@ -28,6 +28,8 @@ def faulty(kind: str, out: Path, side: str = "both", **kwargs: str) -> RunRecord
         ("swapped_phases", "left", "RUNAWAY_LEFT"),
         ("swapped_phases", "right", "RUNAWAY_RIGHT"),
         ("motor_reversed", "left", "RUNAWAY_LEFT"),
+        ("encoder_noise", "left", "ENCODER"),
+        ("link_down_cut", "both", "SETPOINT_TIMEOUT"),
     ],
 )
 def test_board_finds_the_fault_and_names_it(
@@ -47,6 +49,8 @@ def test_board_finds_the_fault_and_names_it(
         ("camera_stall", "camera", 0.7),
         ("camera_occluded", "camera", 0.7),
         ("link_cut", "link", 0.5),
+        ("link_up_cut", "link", 0.5),
+        ("host_clock_step", "host: 5.0", 0.0),
         ("board_reset", "link", 0.5),
     ],
 )

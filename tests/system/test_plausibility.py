@@ -19,7 +19,9 @@ from hil.core.types import Pose, PoseMeasurement
 from hil.record.reader import RunRecord
 from hil.runs.execute import RunSpec, execute_in_memory
 from hil.runs.plausibility import Plausibility
-from hil.study.fault_matrix import fault_free, run_cell
+from hil.study.fault_campaign import finished_free, run_fault_free
+from hil.study.fault_free import fault_free, most_ratio
+from hil.study.fault_matrix import run_cell
 
 LAWS = ("pid", "asg-ism")
 TICK_S = 1.0 / 30.0
@@ -173,12 +175,35 @@ def test_equal_poses_at_rest_are_no_fault() -> None:
 @pytest.mark.parametrize("seed", [4, 10])
 def test_runs_without_a_fault_are_left_alone(seed: int) -> None:
     """A short form of `hil faults --fault-free N`, with slip among them."""
-    assert fault_free(seed) == ""
+    assert fault_free(seed)[1] == ""
+
+
+def test_runs_without_a_fault_are_kept_and_bounded(tmp_path: Path) -> None:
+    """What is done is not done again; 3 / n bounds the share when none of n was stopped."""
+    asked = 2
+    lines = [{"seed": seed, "said": "stopped" if seed == 1 else ""} for seed in range(1, asked + 1)]
+    text = "".join(json.dumps(line) + "\n" for line in lines)
+    (tmp_path / "fault_free.jsonl").write_text(text)
+    told = run_fault_free(asked, 1, tmp_path, lambda *_: None)
+    assert (told["alarms"], told["met"], told["said"]) == (1, False, ["stopped"])
+    assert (tmp_path / "fault_free.jsonl").read_text() == text
+    assert finished_free(tmp_path, 1) == [1, 2]
+    assert most_ratio(0, 2995) == pytest.approx(1e-3, rel=1e-3)  # 1 - 0.05 ** (1 / n)
+    assert most_ratio(1, 4742) == pytest.approx(1e-3, rel=1e-2)
+    assert most_ratio(5, 5) == 1.0
 
 
 @pytest.mark.parametrize(
     ("name", "instant"),
-    [("frames repeated", "at speed"), ("link cut", "closing"), ("encoder dead", "before arming")],
+    [
+        ("frames repeated", "at speed"),
+        ("link cut", "closing"),
+        ("encoder dead", "before arming"),
+        ("host stopped for 1 s", "at speed"),
+        ("host's clock steps by -5 s", "at start"),
+        ("brown-out, board resets", "at speed"),
+        ("colours exchanged", "at speed"),
+    ],
 )
 def test_cells_of_the_matrix(name: str, instant: str) -> None:
     """A short form of `hil faults`; at speed the record is replayed too."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 
 import pytest
 from hypothesis import given, settings
@@ -129,6 +130,41 @@ def test_a_coasting_robot_comes_to_rest_and_stays_there():
     later = settle(model, 0.0, 0.0, seconds=10.0)
     assert math.hypot(later["x_m"] - rest["x_m"], later["y_m"] - rest["y_m"]) < 1e-4
     assert abs(later["theta_rad"] - rest["theta_rad"]) < 1e-4
+
+
+def test_a_robot_at_rest_is_exactly_at_rest():
+    """No speed or current dies away for ever: each ends at 0 and never is a number too small to be normal."""
+    for variant in ("constrained", "slip"):
+        model = plant(robot(variant=variant))
+        moving(model, eta1_m_s=0.5, theta_dot_rad_s=1.0)
+        settle(model, 0.4, -0.2, seconds=0.2)
+        seen = set()
+        for _ in range(400):
+            now = settle(model, 0.0, 0.0, seconds=0.01)
+            speeds = [now[name] for name in ("eta1_m_s", "theta_dot_rad_s", "omega_left_rad_s")]
+            speeds += [now["current_left_a"], now["current_right_a"], now["eta2_m_s"]]
+            assert all(v == 0.0 or abs(v) > 1e-200 for v in speeds)
+            seen.update(v for v in speeds if 0.0 < abs(v) < 1e-50)
+        assert speeds == [0.0] * 6
+        assert seen  # it died away through small numbers, and was not cut off where it matters
+
+
+@pytest.mark.parametrize("variant", ["constrained", "slip", "lifted"])
+def test_a_robot_that_stands_is_reckoned_shorter_with_the_same_bits(variant):
+    """Driving, coasting and standing by turns: with and without the short way the state is one."""
+    full, short = plant(robot(variant=variant)), plant(robot(variant=variant))
+    rng = random.Random(variant)
+    stood = 0
+    for _ in range(40):
+        duty = (0.0, 0.0) if rng.random() < 0.6 else (rng.uniform(-1, 1), rng.uniform(-1, 1))
+        steps = rng.randrange(1, 4000)
+        for model, load in ((full, NO_LOADS), (short, None)):
+            model.run(steps, 1e-4, *duty, load)
+        bits = [[value.hex() for value in model.state] for model in (full, short)]
+        assert bits[0] == bits[1]
+        stood += named(full.state)["omega_left_rad_s"] == 0.0
+    assert 3 < stood < 40
+    assert named(full.state)["charge_ratio"] < 0.7
 
 
 def test_scrub_resists_turning_with_the_moment_of_the_model():

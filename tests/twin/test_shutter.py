@@ -14,7 +14,7 @@ from sim_twin.camera_timing import CLOCK_PPM, Shutter
 
 def frames(count, stalls=(), seed=1, **fields):
     shutter = Shutter(CameraConfig(**fields), Random(seed), 1000.0)
-    return [shutter.next(stalls) for _ in range(count)]
+    return [shutter.expose(stalls) for _ in range(count)]
 
 
 def test_exposures_are_a_period_apart():

@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 from hil.config.camera import CameraConfig, RobotLookConfig, SceneConfig
+from sim_twin import camera_sim
+from sim_twin.camera_sim import RenderedCamera
 from tests.vision.scenes import DEFAULT, rendered
 
 POSE = (0.3, -0.2, 0.7)
@@ -115,3 +117,36 @@ def test_shade_lies_beside_the_robot_and_nowhere_else():
     beside = opencv_pixels(DEFAULT, np.array([[0.0, -0.15, 0.0]]))[0].round().astype(int)
     at = np.s_[beside[1] - 2 : beside[1] + 3, beside[0] - 2 : beside[0] + 3]
     assert full[at].mean() < 0.9 * empty[at].mean()
+
+
+def test_a_camera_drawn_again_is_that_of_a_renderer_of_its_own():
+    """Scene and lines of sight are kept from run to run: whatever was drawn before, frames are the same.
+
+    Other seeds and poses before, and another camera between, change nothing; another seed does.
+    """
+    other = CameraConfig(scene=SceneConfig(gradient_ratio=0.3))
+    poses = [POSE, (0.301, -0.2, 0.71)]
+    wanted = {}
+    for camera in (DEFAULT, other):
+        camera_sim._kept.clear()
+        wanted[camera is other] = RenderedCamera(camera, 5).make(3, poses)
+    camera_sim._kept.clear()
+    for camera in (DEFAULT, DEFAULT, other, DEFAULT):
+        RenderedCamera(camera, 6).make(0, [(0.0, 0.0, 0.0)] * 2)
+        again = RenderedCamera(camera, 5).make(3, poses)
+        np.testing.assert_array_equal(again, wanted[camera is other])
+    assert (RenderedCamera(DEFAULT, 6).make(3, poses) != wanted[False]).any()
+    assert len(camera_sim._kept) == 1
+
+
+def test_a_frame_that_is_held_is_not_drawn_over():
+    """Memory of frames is used again only when nobody holds the frame any more."""
+    camera = RenderedCamera(DEFAULT, 1)
+    held = [camera.make(index, [POSE] * 2) for index in range(6)]
+    before = [frame.copy() for frame in held]
+    part = camera.make(6, [POSE] * 2)[100:200, 100:200]
+    kept = part.copy()
+    for index in range(7, 20):
+        camera.make(index, [(-0.3, 0.2, 0.1)] * 2)
+    for frame, copy in zip((*held, part), (*before, kept), strict=True):
+        np.testing.assert_array_equal(frame, copy)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from hil.core.errors import BadInput
 from vision import cv_compat
 from vision.calibration.checker import checker_fault
+from vision.calibration.sharpness import blurred_hint
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -207,10 +208,10 @@ Board = Chessboard | Charuco
 
 
 def not_seen_hint(board: Board, image: Image) -> str:
-    """Return what is seen in place of the board: the same with the squares the other way round."""
+    """Return why a board may not be seen: its squares the other way round, or a blurred picture."""
     other = board.other_print() if isinstance(board, Charuco) else None
     if other is None or other.find(image) is None:
-        return ""
+        return blurred_hint(cv_compat.grey(image))
     name = "charuco-old" if other.old else "charuco"
     sizes = f"{other.columns}x{other.rows}:{other.square_m * 1e3:g}:{other.marker_m * 1e3:g}"
     return (

@@ -131,6 +131,8 @@ def views_of_camera(board: Board, camera: LiveCamera, wanted: int, report: Repor
     next_look_s = -math.inf
     while len(found.views) < wanted:
         frame = camera.read()
+        if frame.note:
+            report(f"{camera.name}: {frame.note}")
         if frame.t_cam_s < next_look_s:
             continue
         next_look_s = frame.t_cam_s + 1.0 / LOOKS_PER_S

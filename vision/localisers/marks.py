@@ -13,57 +13,44 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from hil.config.camera import MarkConfig, MarksConfig
-from hil.core.types import Pose, PoseMeasurement, wrap_pi
+from hil.core.types import Pose, PoseMeasurement
 from vision.camera import CameraModel
-from vision.disc_fit import Disc, Marks, Point, RimFitter
+from vision.disc_fit import Disc, Marks, RimFitter
+from vision.mark_search import CHROMA_BASIS, Centres, MarkSearch, Point, Window
+from vision.pose_fit import weighted_pose
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
-Centres = tuple[Point, Point]  # front and rear mark, (x, y) m on their plane
-Window = tuple[int, int, int, int]  # left, top, right, bottom, px
-
-# The coarse image: marks are this wide in it at least, px.
-COARSE_DIAMETER_PX = 5.0
-# Rise of the mean response over a mark against its surroundings, DN: a third of a dim green mark's.
-COARSE_RISE_MIN_DN = 3.0
-# Blue, green and red as two chromas, orthonormal and zero for grey.
-CHROMA_BASIS = np.array(
-    [
-        [-math.sqrt(0.5), math.sqrt(0.5), 0.0],
-        [-math.sqrt(1 / 6), -math.sqrt(1 / 6), math.sqrt(2 / 3)],
-    ]
-)
-HUE_COS_MIN = 0.8  # 37 deg: coloured light, white balance and what lies beside the mark
-CANDIDATES_MAX = 10
-PAIRS_MAX = 12
-# How far off a coarse place may be, share of a mark's radius.
-COARSE_ERROR = 0.6
 
 # What is accepted.
 SHARE_MIN = 0.4
 GROWTH_MAX = 0.12
+GROWTH_DOUBT = 0.5  # more where the rim is rough: noise, blur longer than the profiles
 RESIDUAL_MAX = 0.09  # of the radius
 RESIDUAL_FREE_PX = 0.25  # sensor noise
 DISTANCE_TOLERANCE = 0.04
 
-# An edge fit is never better than this: lens model, interpolation, light within a profile.
-SIGMA_MIN_PX = 0.01
+# How many degrees of freedom the discs' own claims are worth against that of their distance.
+MISFIT_FREEDOM = 4.0
 QUALITY_RESIDUAL = 0.06  # of the radius
+# What is hardly within each limit is no robot: the least of extreme blur and noise has 0.17.
+QUALITY_MIN = 0.12
 SAME_PLACE_M = 0.02
+TWO_PLACES = "two places look like the robot"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Found:
     """Two discs taken for the robot's marks."""
 
     discs: Marks
     centres_m: Centres
     gap_m: float
+    spreads_m2: tuple[Array, Array]
 
 
 class MarkLocaliser:
@@ -74,13 +61,14 @@ class MarkLocaliser:
         self._height_m = marks.height_m
         self._radius_m = 0.5 * marks.diameter_m
         self._ground_ratio_max = marks.ground_ratio_max
+        self._which_m = marks.which_m
         self._front_m, self._rear_m = ((m.x_m, m.y_m) for m in (marks.front, marks.rear))
         self._distance_m = math.dist(self._front_m, self._rear_m)
         weights = np.stack([_response(marks.front), _response(marks.rear)])
-        self._hues = (weights @ CHROMA_BASIS.T).astype(np.float32)
         self._rims = RimFitter(model, self._radius_m, self._height_m, weights)
-        self._diameter_px = self._smallest_diameter_px()
-        self._shrink = max(1, int(self._diameter_px / COARSE_DIAMETER_PX))
+        self._places = MarkSearch(
+            model, self._radius_m, self._height_m, self._distance_m, weights @ CHROMA_BASIS.T
+        )
 
     def locate(
         self, image_bgr: Image, predicted: Pose | None, search_radius_m: float
@@ -91,17 +79,75 @@ class MarkLocaliser:
         of it, else in the whole frame.
         """
         if predicted is not None:
-            centres = self._marks_of(predicted)
-            found, _ = self._measured(image_bgr, centres, wide=False)
-            if found is None:
-                window = self._window(image_bgr, centres, search_radius_m)
-                found = self._search(image_bgr, window)[0] if window else None
-            if found is not None:
-                return self._measurement(found, in_window=True)
-        found, reason = self._search(image_bgr, (0, 0, image_bgr.shape[1], image_bgr.shape[0]))
+            seen = self.near(image_bgr, predicted, search_radius_m)
+            if seen is not None:
+                return seen
+        whole = (0, 0, image_bgr.shape[1], image_bgr.shape[0])
+        return self.inside(image_bgr, whole, predicted)
+
+    def near(
+        self, image_bgr: Image, predicted: Pose, search_radius_m: float
+    ) -> PoseMeasurement | None:
+        """Return the pose at a prediction or within `search_radius_m` of it, None if not there."""
+        centres = self._marks_of(predicted)
+        found, _ = self._measured(image_bgr, centres)
         if found is None:
+            window = self._window(image_bgr, centres, search_radius_m)
+            finds = self._search(image_bgr, window)[0] if window else []
+            found = self._ours(finds, predicted)
+        return None if found is None else self._measurement(found, in_window=True)
+
+    def inside(
+        self, image_bgr: Image, window: Window, predicted: Pose | None = None
+    ) -> PoseMeasurement:
+        """Return the pose seen in a part of the image; of several alike, the one that is ours."""
+        finds, reason = self._search(image_bgr, window)
+        found = self._ours(finds, predicted)
+        if found is None:
+            reason = TWO_PLACES if finds else reason
             return PoseMeasurement(None, 0.0, reason, details={"window": 0.0})
         return self._measurement(found, in_window=False)
+
+    def ours(self, finds: list[PoseMeasurement], predicted: Pose | None) -> PoseMeasurement | None:
+        """Return which of several finds is our robot; None for none, "not seen" for too many."""
+        if len(finds) < 2:
+            return finds[0] if finds else None
+        place = self._place(predicted)
+        if place is None or any(find.pose is None for find in finds):
+            return PoseMeasurement(None, 0.0, TWO_PLACES, details={"window": 0.0})
+        return min(finds, key=lambda find: _away(find, place))
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of the frames."""
+        return self._model.width_px, self._model.height_px
+
+    @property
+    def span_px(self) -> int:
+        """How long the robot's marks and their rims are together in the image, at most."""
+        width, height = self.size_px
+        spans = [0.0]
+        for u in (0.0, 0.5 * width, float(width)):
+            for v in (0.0, 0.5 * height, float(height)):
+                slope = self._model.floor_jacobian(u, v, self._height_m)
+                if np.isfinite(slope).all():
+                    spans.append(1.0 / float(np.linalg.norm(slope, -2)))
+        return math.ceil(max(spans) * (self._distance_m + 4.0 * self._radius_m))
+
+    def _place(self, predicted: Pose | None) -> Point | None:
+        """Return where our robot is expected among several alike; None where nobody said."""
+        if self._which_m is None or predicted is None:
+            return self._which_m
+        return predicted.x_m, predicted.y_m
+
+    def _ours(self, finds: list[_Found], predicted: Pose | None) -> _Found | None:
+        """Return the find that is our robot; None for none, or where two could be it."""
+        if len(finds) < 2:
+            return finds[0] if finds else None
+        place = self._place(predicted)
+        if place is None:
+            return None
+        return min(finds, key=lambda found: math.dist(np.mean(found.centres_m, axis=0), place))
 
     # -- where to look -------------------------------------------------------------------------
 
@@ -114,28 +160,6 @@ class MarkLocaliser:
         )
         return front, rear
 
-    def _pose_of(self, centres_m: Centres) -> tuple[Pose, float]:
-        """Return the pose that fits both marks best, and the RMS of what is left."""
-        (fx, fy), (rx, ry) = centres_m
-        (bfx, bfy), (brx, bry) = self._front_m, self._rear_m
-        theta = wrap_pi(math.atan2(fy - ry, fx - rx) - math.atan2(bfy - bry, bfx - brx))
-        c, s = math.cos(theta), math.sin(theta)
-        mx, my = 0.5 * (bfx + brx), 0.5 * (bfy + bry)
-        pose = Pose(0.5 * (fx + rx) - (c * mx - s * my), 0.5 * (fy + ry) - (s * mx + c * my), theta)
-        return pose, 0.5 * abs(math.dist(*centres_m) - self._distance_m)
-
-    def _smallest_diameter_px(self) -> float:
-        """Return how wide a mark is where the camera sees it smallest."""
-        model, least = self._model, math.inf
-        for u in (0.1, 0.5, 0.9):
-            for v in (0.1, 0.5, 0.9):
-                at = (u * model.width_px, v * model.height_px)
-                jacobian = model.floor_jacobian(*at, self._height_m)
-                if np.isfinite(jacobian).all():
-                    largest_m_px = float(np.linalg.norm(jacobian, 2))
-                    least = min(least, 2.0 * self._radius_m / largest_m_px)
-        return least if math.isfinite(least) else COARSE_DIAMETER_PX
-
     def _window(self, image: Image, centres_m: Centres, radius_m: float) -> Window | None:
         """Return the part of the image around predicted marks, None when out of view."""
         reach_m = radius_m + 2.0 * self._radius_m
@@ -147,74 +171,38 @@ class MarkLocaliser:
         height, width = image.shape[:2]
         left, top = np.maximum(px.min(axis=0).astype(int), 0).tolist()
         right, bottom = np.minimum(px.max(axis=0).astype(int) + 2, (width, height)).tolist()
-        least = 4 * self._shrink
+        least = 4 * self._places.grid_px
         return (left, top, right, bottom) if min(right - left, bottom - top) > least else None
 
     # -- coarse --------------------------------------------------------------------------------
 
-    def _search(self, image: Image, window: Window) -> tuple[_Found | None, str]:
-        """Return the robot in a part of the image, or None and the reason."""
-        candidates = self._candidates(image, window)
-        for name, places in zip(("front", "rear"), candidates, strict=True):
-            if not places:
-                return None, f"{name} mark not found"
-        pairs = self._pairs(*candidates)
-        if not pairs:
-            return None, "marks found, but none the robot's distance apart"
-        reason, best = "", None
+    def _search(self, image: Image, window: Window) -> tuple[list[_Found], str]:
+        """Return what looks like the robot in a part of the image; if nothing, the reason.
+
+        Two at most where nobody said which is ours: one more is one too many.
+        """
+        pairs, reason = self._places.pairs(image, window)
+        finds: list[_Found] = []
+        why = ""
         for centres in pairs:
-            found, why = self._measured(image, centres, wide=True)
-            reason = reason or why
+            if any(_near(centres, found, self._radius_m) for found in finds):
+                continue
+            found, refusal = self._measured(image, centres)
+            why = why or refusal
             if found is None:
                 continue
-            if best is not None and not _same(found, best):
-                return None, "two places look like the robot"
-            best = best or found
-        return best, reason
-
-    def _candidates(self, image: Image, window: Window) -> list[list[Point]]:
-        """Return where each mark may be, m on the marks' plane, strongest first."""
-        left, top, right, bottom = window
-        part, shrink = image[top:bottom, left:right], self._shrink
-        if shrink > 1:
-            size = ((right - left) // shrink, (bottom - top) // shrink)
-            part = part[: size[1] * shrink, : size[0] * shrink]
-            part = np.asarray(cv2.resize(part, size, interpolation=cv2.INTER_AREA), np.uint8)
-        chroma = cv2.transform(part.astype(np.float32), CHROMA_BASIS)
-        wide = math.ceil(self._diameter_px / shrink) | 1
-        # Against its surroundings, so that a coloured floor is not a mark.
-        mean = cv2.blur(chroma, (wide, wide), borderType=cv2.BORDER_REPLICATE)
-        about = cv2.blur(chroma, (3 * wide, 3 * wide), borderType=cv2.BORDER_REPLICATE)
-        chroma = cv2.subtract(mean, about)
-        rise = cv2.transform(chroma, self._hues)
-        highest = cv2.dilate(rise, np.ones((wide, wide), np.uint8))
-        v, u, mark = np.nonzero((rise == highest) & (rise > COARSE_RISE_MIN_DN))
-        strength = rise[v, u, mark]
-        own_hue = strength > HUE_COS_MIN * np.hypot(*chroma[v, u].T)
-        v, u, mark, strength = v[own_hue], u[own_hue], mark[own_hue], strength[own_hue]
-        order = np.argsort(-strength, kind="stable")
-        px = np.column_stack((u, v))[order] * shrink + (0.5 * (shrink - 1) + np.array((left, top)))
-        own = [px[mark[order] == index][:CANDIDATES_MAX].tolist() for index in (0, 1)]
-        return [[self._model.floor_point(u, v, self._height_m) for u, v in at] for at in own]
-
-    def _pairs(self, front: list[Point], rear: list[Point]) -> list[Centres]:
-        """Return pairs about the robot's distance apart, likeliest first."""
-        limit_m = 2.0 * COARSE_ERROR * self._radius_m
-        ranked = [
-            (i + j, (f, r))
-            for i, f in enumerate(front)
-            for j, r in enumerate(rear)
-            if abs(math.dist(f, r) - self._distance_m) < limit_m
-        ]
-        return [pair for _, pair in sorted(ranked)[:PAIRS_MAX]]
+            rivals = [other for other in finds if _sharing(found, other)]
+            best = min([found, *rivals], key=self._badness)
+            finds = [other for other in finds if other not in rivals] + [best]
+            if self._which_m is None and len(finds) > 1:
+                break
+        return finds, why or reason
 
     # -- fine ----------------------------------------------------------------------------------
 
-    def _measured(
-        self, image: Image, centres_m: Centres, *, wide: bool
-    ) -> tuple[_Found | None, str]:
+    def _measured(self, image: Image, centres_m: Centres) -> tuple[_Found | None, str]:
         """Return the marks near two guessed centres, or None and why they are not the robot's."""
-        discs = self._rims.fit(image, centres_m, wide=wide)
+        discs = self._rims.fit(image, centres_m)
         if discs is None:
             return None, "marks have no rim"
         for name, disc in zip(("front", "rear"), discs, strict=True):
@@ -224,20 +212,36 @@ class MarkLocaliser:
         at = self._model.floor_point
         front, rear = (at(disc.u_px, disc.v_px, self._height_m) for disc in discs)
         gap_m = math.dist(front, rear) - self._distance_m
-        if not abs(gap_m) <= DISTANCE_TOLERANCE * self._distance_m:
+        spreads = (self._spread(discs[0]), self._spread(discs[1]))
+        along = np.subtract(front, rear) / max(math.dist(front, rear), 1e-9)
+        doubt_m = 2.0 * math.sqrt(float(along @ (spreads[0] + spreads[1]) @ along))
+        most_m = DISTANCE_TOLERANCE * self._distance_m
+        if not abs(gap_m) <= most_m + min(doubt_m, most_m):
             own_mm = 1e3 * self._distance_m
             return (
                 None,
                 f"marks {own_mm + 1e3 * gap_m:.0f} mm apart, the robot's are {own_mm:.0f} mm",
             )
-        return _Found(discs, (front, rear), gap_m), ""
+        found = _Found(discs, (front, rear), gap_m, spreads)
+        quality = self._quality(found)
+        if not quality >= QUALITY_MIN:
+            return None, f"rims and distance fit badly together: {quality:.3f}, limit {QUALITY_MIN}"
+        return found, ""
+
+    def _quality(self, found: _Found) -> float:
+        """Return the smaller share of rim times how well rims and distance fit; 1 is whole and sharp."""
+        share = min(disc.share for disc in found.discs)
+        sharp = max(disc.residual_px / disc.radius_px for disc in found.discs) / QUALITY_RESIDUAL
+        misfit = found.gap_m / (DISTANCE_TOLERANCE * self._distance_m)
+        return share * math.exp(-0.5 * sharp**2 - misfit**2)
 
     def _refusal(self, disc: Disc) -> str:
         """Return why a disc cannot be a mark, "" when it can."""
         if disc.share < SHARE_MIN:
             return f"{disc.share:.0%} of its rim seen, limit {SHARE_MIN:.0%}"
-        if not abs(disc.growth) <= GROWTH_MAX:
-            return f"{1.0 + disc.growth:.2f} of its size, limit 1 +- {GROWTH_MAX:g}"
+        most = GROWTH_MAX + GROWTH_DOUBT * disc.residual_px / disc.radius_px
+        if not abs(disc.growth) <= most:
+            return f"{1.0 + disc.growth:.2f} of its size, limit 1 +- {most:.2f}"
         most_px = RESIDUAL_FREE_PX + RESIDUAL_MAX * disc.radius_px
         if not disc.residual_px <= most_px:
             return f"rim off by {disc.residual_px:.2f} px RMS, limit {most_px:.2f} px"
@@ -250,18 +254,18 @@ class MarkLocaliser:
     def _measurement(self, found: _Found, *, in_window: bool) -> PoseMeasurement:
         """Return pose, quality (1: both rims whole and sharp) and claimed deviations."""
         front, rear = found.discs
-        pose, residual_m = self._pose_of(found.centres_m)
-        variance = sum(
-            (disc.sigma_px**2 + SIGMA_MIN_PX**2) * (self._radius_m / disc.radius_px) ** 2
-            for disc in found.discs
+        pose, covariance, misfit2 = weighted_pose(
+            (self._front_m, self._rear_m), found.centres_m, found.spreads_m2
         )
-        sharp = max(disc.residual_px / disc.radius_px for disc in found.discs) / QUALITY_RESIDUAL
-        misfit = found.gap_m / (DISTANCE_TOLERANCE * self._distance_m)
+        # Marks further off their distance than they claim: both claims are too small.
+        covariance *= (MISFIT_FREEDOM + misfit2) / (MISFIT_FREEDOM + 1.0)
+        residual_m = 0.5 * abs(found.gap_m)
         return PoseMeasurement(
             pose,
-            quality=min(front.share, rear.share) * math.exp(-0.5 * sharp**2 - misfit**2),
-            sigma_xy_m=math.sqrt(0.25 * variance + residual_m**2),
-            sigma_theta_rad=math.sqrt(variance) / self._distance_m,
+            quality=self._quality(found),
+            sigma_xy_m=math.sqrt(0.5 * (covariance[0, 0] + covariance[1, 1])),
+            sigma_theta_rad=math.sqrt(covariance[2, 2]),
+            covariance=tuple(covariance[np.triu_indices(3)].tolist()),
             details={
                 "front_u_px": front.u_px,
                 "front_v_px": front.v_px,
@@ -278,11 +282,35 @@ class MarkLocaliser:
             },
         )
 
+    def _badness(self, found: _Found) -> float:
+        """Return how far a find is from the marks as they are: distance, sizes and rims."""
+        rims = sum(abs(d.growth) + d.residual_px / d.radius_px for d in found.discs)
+        return rims + abs(found.gap_m) / (DISTANCE_TOLERANCE * self._distance_m)
 
-def _same(one: _Found, other: _Found) -> bool:
-    """Return whether two finds are one robot."""
+    def _spread(self, disc: Disc) -> Array:
+        """Return the covariance of a mark's place on its plane, (2, 2), m^2."""
+        uu, uv, vv = disc.covariance_px2
+        slope = self._model.floor_jacobian(disc.u_px, disc.v_px, self._height_m)
+        spread: Array = slope @ np.array([[uu, uv], [uv, vv]]) @ slope.T
+        return spread
+
+
+def _away(find: PoseMeasurement, place_m: Point) -> float:
+    """Return how far a find is from a place, m."""
+    assert find.pose is not None
+    return math.dist((find.pose.x_m, find.pose.y_m), place_m)
+
+
+def _sharing(one: _Found, other: _Found) -> bool:
+    """Return whether two finds have a mark in common: at most one of them is a robot."""
     pairs = zip(one.centres_m, other.centres_m, strict=True)
-    return all(math.dist(a, b) < SAME_PLACE_M for a, b in pairs)
+    return any(math.dist(a, b) < SAME_PLACE_M for a, b in pairs)
+
+
+def _near(centres_m: Centres, found: _Found, within_m: float) -> bool:
+    """Return whether a hypothesis is the one already measured."""
+    pairs = zip(centres_m, found.centres_m, strict=True)
+    return all(math.dist(a, b) < within_m for a, b in pairs)
 
 
 def _area_px(disc: Disc) -> float:

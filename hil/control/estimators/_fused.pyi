@@ -4,6 +4,8 @@ SI units, radians, host times in s. World X right, Y up; body x forward, y left;
 and unwrapped. z1 is the flat output point, d0 ahead of the centre of mass.
 """
 
+from collections.abc import Sequence
+
 Matrix = list[list[float]]
 """6 x 6, over [z1_x, z1_y, theta, k_d, k_t, d0]."""
 Piece = tuple[float, float, float]
@@ -94,9 +96,17 @@ class PoseFilter:
         """Return the pose seen minus the pose expected (m, m, rad)."""
 
     def correct(
-        self, innovation: tuple[float, float, float], var_xy: float, var_theta: float, gate: float
+        self,
+        innovation: tuple[float, float, float],
+        var_xy: float,
+        var_theta: float,
+        gate: float,
+        excess: Sequence[float] = ...,
     ) -> bool:
-        """Take the innovation unless its squared Mahalanobis distance exceeds `gate`."""
+        """Take the innovation unless its squared Mahalanobis distance exceeds `gate`.
+
+        `excess` (xx, xy, xt, yy, yt, tt) is the measurement's covariance less the two variances.
+        """
 
     @property
     def x(self) -> list[float]:
@@ -115,6 +125,9 @@ class Fused:
 
     def take_wheels(self, t_host_s: float, counts_left: int, counts_right: int) -> None:
         """Take one wheel report (in time order; a stale one is dropped). Counts are int32."""
+
+    def expect(self, excess: Sequence[float]) -> None:
+        """Take (xx, xy, xt, yy, yt, tt), the covariance of poses to come less their two sigmas'."""
 
     def take_pose(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from hil.control.estimators import _fused
@@ -11,6 +12,9 @@ from hil.core.types import Estimate, Pose, PoseMeasurement, WheelSample
 if TYPE_CHECKING:
     from hil.config.control import EstimatorConfig
     from hil.control.estimators.geometry import BelievedGeometry
+
+
+NO_EXCESS = (0.0,) * 6
 
 
 def assumptions(config: EstimatorConfig) -> _fused.Assumptions:
@@ -57,6 +61,7 @@ class Fused(_fused.Fused):
         agree with each other (the robot was moved, or slides).
         """
         pose = measurement.pose
+        self.expect(_excess(measurement))
         return pose is not None and self.take_pose(
             t_exposure_s,
             pose.x_m,
@@ -77,3 +82,13 @@ class Fused(_fused.Fused):
         x_m, y_m, theta_rad, eta1_m_s, theta_dot_rad_s, z1_m, z2_m_s = state
         pose = Pose(x_m, y_m, theta_rad)
         return Estimate(t_host_s, pose, eta1_m_s, theta_dot_rad_s, z1_m, z2_m_s)
+
+
+def _excess(measurement: PoseMeasurement) -> tuple[float, ...]:
+    """Return (xx, xy, xt, yy, yt, tt): the covariance claimed less that of the two sigmas."""
+    claimed = measurement.covariance
+    if claimed is None or not all(map(math.isfinite, claimed)):
+        return NO_EXCESS
+    xx, xy, xt, yy, yt, tt = claimed
+    var_xy, var_theta = measurement.sigma_xy_m**2, measurement.sigma_theta_rad**2
+    return xx - var_xy, xy, xt, yy - var_xy, yt, tt - var_theta

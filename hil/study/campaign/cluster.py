@@ -2,6 +2,9 @@
 
 The cluster may grow and shrink meanwhile: what is handed out follows the threads it has. Whatever
 ends the cluster for good is one line, and what has come until then is kept by the caller.
+
+What goes to and fro are Python objects: who reaches the scheduler runs code on its workers and here. So
+an address of another machine that is not checked by certificates (tls://) is told, once.
 """
 
 from __future__ import annotations
@@ -26,6 +29,7 @@ _CONNECT_S = 10
 _LOOK_S = 1.0
 _SAY_S = 3.0
 _GIVE_UP_S = 30.0
+_LOOPBACK = {"127.0.0.1", "localhost", "::1"}
 # What a worker has to be able to import.
 PROGRAM = ("hil.runs.execute", "hil.study.campaign.work", "sim_twin._native")
 _KEPT = "rows so far are kept, the same command goes on"
@@ -52,6 +56,9 @@ def on_dask(
         raise BadInput(
             "--dask: the package distributed is missing; pip install 'skid-steer-hil[cluster]'"
         ) from None
+    doubt = open_to_others(address)
+    if doubt:
+        say(f"--dask {address}: {doubt}")
     with _quiet():
         try:
             client = dask.Client(address, timeout=_CONNECT_S)
@@ -63,6 +70,18 @@ def on_dask(
         finally:
             with suppress(Exception):  # the scheduler may be gone: nothing is left to be told
                 client.close(timeout=2)
+
+
+def open_to_others(address: str) -> str:
+    """Return what is trusted by using a scheduler at `address`, "" for this machine's or a checked one."""
+    kind, _, place = address.rpartition("://")
+    host = place.rpartition(":")[0] or place
+    if kind in {"tls", "wss", "inproc"} or host.strip("[]") in _LOOPBACK:
+        return ""
+    return (
+        "whoever reaches that scheduler can run code on its workers and here, and nothing checks who "
+        "does; use tls://, or a tunnel to a scheduler on 127.0.0.1"
+    )
 
 
 class _Crew:

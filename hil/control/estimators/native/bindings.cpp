@@ -128,7 +128,8 @@ void bind_filter(nb::module_& m) {
              return nb::make_tuple(i[0], i[1], i[2]);
            },
            "x_m"_a, "y_m"_a, "theta_rad"_a)
-      .def("correct", &PoseFilter::correct, "innovation"_a, "var_xy"_a, "var_theta"_a, "gate"_a)
+      .def("correct", &PoseFilter::correct, "innovation"_a, "var_xy"_a, "var_theta"_a, "gate"_a,
+           "excess"_a = estimator::Excess{})
       .def_prop_ro("x", [](const PoseFilter& f) { return f.mean(); })
       .def_prop_ro("P", [](const PoseFilter& f) { return f.covariance(); });
 }
@@ -151,6 +152,7 @@ void bind_fused(nb::module_& m) {
            },
            "t_effect_s"_a, "left_rad_s"_a, "right_rad_s"_a)
       .def("take_wheels", &Fused::take_wheels, "t_host_s"_a, "counts_left"_a, "counts_right"_a)
+      .def("expect", &Fused::expect, "excess"_a)
       .def("take_pose",
            [](Fused& f, double t_exposure_s, double x_m, double y_m, double theta_rad,
               double sigma_xy_m, double sigma_theta_rad) {

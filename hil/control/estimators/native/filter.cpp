@@ -24,13 +24,15 @@ PoseFilter::PoseFilter(const Assumptions& a, double d0_m)
   P_[kOffset][kOffset] = square(a.sigma_d0_m);
 }
 
-void PoseFilter::place(const Pose& pose, double sigma_xy_m, double sigma_theta_rad) {
+void PoseFilter::place(const Pose& pose, double sigma_xy_m, double sigma_theta_rad,
+                       const Excess& excess) {
   const double theta = x_[kTheta] + wrap_pi(pose.theta_rad - x_[kTheta]), d0 = x_[kOffset];
   const double c = std::cos(theta), s = std::sin(theta);
   x_[kZ1X] = pose.x_m + d0 * c;
   x_[kZ1Y] = pose.y_m + d0 * s;
   x_[kTheta] = theta;
-  const double var_xy = square(sigma_xy_m), var_theta = square(sigma_theta_rad);
+  const auto [xx, xy, xt, yy, yt, tt] = excess;
+  const double var_xy = square(sigma_xy_m), var_theta = square(sigma_theta_rad) + tt;
   const double var_d0 = P_[kOffset][kOffset];
   for (int i : {kZ1X, kZ1Y, kTheta}) {
     for (int j = 0; j < kStates; ++j) P_[i][j] = P_[j][i] = 0.0;
@@ -38,12 +40,14 @@ void PoseFilter::place(const Pose& pose, double sigma_xy_m, double sigma_theta_r
   P_[kTheta][kTheta] = var_theta;
   P_[kZ1X][kZ1X] = P_[kZ1Y][kZ1Y] = var_xy;
   // z1 = pose + d0 e(theta) carries the errors of theta and d0.
-  const double by_theta[] = {-d0 * s, d0 * c}, by_d0[] = {c, s};
+  const double by_theta[] = {-d0 * s, d0 * c}, by_d0[] = {c, s}, with_theta[] = {xt, yt};
+  const double with[2][2] = {{xx, xy}, {xy, yy}};
   for (int i : {kZ1X, kZ1Y}) {
-    P_[i][kTheta] = P_[kTheta][i] = by_theta[i] * var_theta;
+    P_[i][kTheta] = P_[kTheta][i] = by_theta[i] * var_theta + with_theta[i];
     P_[i][kOffset] = P_[kOffset][i] = by_d0[i] * var_d0;
     for (int j : {kZ1X, kZ1Y}) {
       P_[i][j] += by_theta[i] * by_theta[j] * var_theta + by_d0[i] * by_d0[j] * var_d0;
+      P_[i][j] += with[i][j] + by_theta[i] * with_theta[j] + by_theta[j] * with_theta[i];
     }
   }
 }
@@ -91,28 +95,44 @@ Innovation PoseFilter::innovation(const Pose& pose) const {
           wrap_pi(pose.theta_rad - x_[kTheta])};
 }
 
-// The three components are independent, so they are taken one after the other; the sum of their
-// normalised squares is the distance of the whole.
-bool PoseFilter::correct(const Innovation& innovation, double var_xy, double var_theta,
-                         double gate) {
+// The components are made independent (R = L D L', each less what those before it say of its error), then
+// taken one after the other; the sum of their normalised squares is the distance of the whole.
+bool PoseFilter::correct(const Innovation& innovation, double var_xy, double var_theta, double gate,
+                         const Excess& excess) {
   const double d0 = x_[kOffset], c = std::cos(x_[kTheta]), s = std::sin(x_[kTheta]);
-  // Beside the identity, dh/dtheta and dh/dd0.
-  struct Row {
-    double variance, by_theta, by_d0;
+  const auto [xx, xy, xt, yy, yt, tt] = excess;
+  std::array<Vector, 3> rows{};  // dh/dx
+  rows[0][kZ1X] = rows[1][kZ1Y] = rows[2][kTheta] = 1.0;
+  rows[0][kTheta] = d0 * s;
+  rows[0][kOffset] = -c;
+  rows[1][kTheta] = -d0 * c;
+  rows[1][kOffset] = -s;
+  Innovation seen = innovation;
+  Innovation variance{var_xy + xx, var_xy + yy, var_theta + tt};
+  const double yx = xy / variance[0], tx = xt / variance[0];
+  variance[1] -= yx * xy;
+  const double ty = (yt - tx * xy) / variance[1];
+  variance[2] -= tx * xt + ty * ty * variance[1];
+  const auto less = [&](int i, double share, int j) {
+    seen[i] -= share * seen[j];
+    for (int k = 0; k < kStates; ++k) rows[i][k] -= share * rows[j][k];
   };
-  const Row rows[] = {{var_xy, d0 * s, -c}, {var_xy, -d0 * c, -s}, {var_theta, 0.0, 0.0}};
+  less(1, yx, 0);
+  less(2, tx, 0);
+  less(2, ty, 1);
   Matrix P = P_;
   Vector change{};
   double distance2 = 0.0;
-  for (int i : {kZ1X, kZ1Y, kTheta}) {
-    const Row& h = rows[i];
-    Vector ph;  // P h'
+  for (int i = 0; i < 3; ++i) {
+    const Vector& h = rows[i];
+    Vector ph{};  // P h'
+    double left = seen[i], spread = 0.0;
     for (int j = 0; j < kStates; ++j) {
-      ph[j] = P[j][i] + h.by_theta * P[j][kTheta] + h.by_d0 * P[j][kOffset];
+      for (int k = 0; k < kStates; ++k) ph[j] += h[k] * P[j][k];
+      left -= h[j] * change[j];
     }
-    const double total = ph[i] + h.by_theta * ph[kTheta] + h.by_d0 * ph[kOffset] + h.variance;
-    const double left =
-        innovation[i] - change[i] - h.by_theta * change[kTheta] - h.by_d0 * change[kOffset];
+    for (int j = 0; j < kStates; ++j) spread += h[j] * ph[j];
+    const double total = spread + variance[i];
     distance2 += left * left / total;
     if (!(distance2 <= gate)) return false;  // NaN too
     for (int j = 0; j < kStates; ++j) {

@@ -31,6 +31,8 @@ enum FilterState : int { kZ1X, kZ1Y, kTheta, kDistance, kTurn, kOffset, kStates 
 using Vector = std::array<double, kStates>;
 using Matrix = std::array<Vector, kStates>;
 using Innovation = std::array<double, 3>;  // m, m, rad
+// Covariance of a pose less the diagonal of its two sigmas: xx, xy, xt, yy, yt, tt; zero where none is known.
+using Excess = std::array<double, 6>;
 
 // The angle wrapped to [-pi, pi); hil.core.types.wrap_pi to the bit.
 double wrap_pi(double angle_rad);
@@ -44,7 +46,7 @@ class PoseFilter {
   PoseFilter(const Assumptions& assumptions, double d0_m);
 
   // Starts at a pose; scales and d0 keep what is known of them, theta stays unwrapped.
-  void place(const Pose& pose, double sigma_xy_m, double sigma_theta_rad);
+  void place(const Pose& pose, double sigma_xy_m, double sigma_theta_rad, const Excess& excess = {});
 
   // Carries mean and covariance over one increment of odometry (believed units) that took dt_s. length_m
   // and angle_rad are its distance and turn with all signs positive: noise grows with what was travelled,
@@ -56,7 +58,8 @@ class PoseFilter {
 
   // Takes the innovation, unless its squared Mahalanobis distance exceeds the gate (or is no number): then
   // nothing changes and the answer is false.
-  bool correct(const Innovation& innovation, double var_xy, double var_theta, double gate);
+  bool correct(const Innovation& innovation, double var_xy, double var_theta, double gate,
+               const Excess& excess = {});
 
   const Vector& mean() const { return x_; }
   const Matrix& covariance() const { return P_; }

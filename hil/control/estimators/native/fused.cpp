@@ -153,7 +153,7 @@ bool Fused::take_pose(double t_exposure_s, const Pose& pose, double sigma_xy_m,
 
 // Sets the anchor on a pose.
 void Fused::place(double t_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad) {
-  filter_.place(pose, sigma_xy_m, sigma_theta_rad);
+  filter_.place(pose, sigma_xy_m, sigma_theta_rad, excess_);
   t_pose_s_ = t_s;
 }
 
@@ -165,7 +165,7 @@ bool Fused::correct(double t_s, const Pose& pose, double sigma_xy_m, double sigm
   const double sigma_time_s = assumptions_.sigma_time_s;
   const double var_xy = square(sigma_xy_m) + square(sigma_time_s * speed.forward_m);
   const double var_theta = square(sigma_theta_rad) + square(sigma_time_s * speed.turn_rad);
-  if (filter_.correct(innovation, var_xy, var_theta, assumptions_.gate_chi2)) {
+  if (filter_.correct(innovation, var_xy, var_theta, assumptions_.gate_chi2, excess_)) {
     t_pose_s_ = t_agreed_s_ = t_s;
     gated_.run = 0;
     return true;

@@ -41,6 +41,9 @@ class Fused {
   // Takes one wheel report (in time order; a stale one is dropped).
   void take_wheels(double t_host_s, std::int32_t counts_left, std::int32_t counts_right);
 
+  // What is known of the covariance of the poses to come, besides their two sigmas.
+  void expect(const Excess& excess) { excess_ = excess; }
+
   // Takes the pose seen at t_exposure_s in the past; older than the last one is dropped. Says whether it was
   // believed: it passed the gate, or ended a run of gated ones that agree.
   bool take_pose(double t_exposure_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad);
@@ -96,6 +99,7 @@ class Fused {
 
   Assumptions assumptions_;
   Geometry geometry_;
+  Excess excess_{};
   PoseFilter filter_;
   WheelSpeeds speeds_;
   CommandHistory commands_;

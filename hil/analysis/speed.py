@@ -1,0 +1,40 @@
+"""Speed figures: medians of several runs of one thing, never a test."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+# Name, unit, goal, and what gives one value.
+Plan = tuple[str, str, str, Callable[[], float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One speed figure: median, least and largest of `runs` runs; `goal` is what it should reach.
+
+    `values` are all that was measured, in ascending order.
+    """
+
+    name: str
+    unit: str
+    median: float
+    least: float
+    largest: float
+    runs: int
+    goal: str
+    values: tuple[float, ...]
+
+    @classmethod
+    def of(cls, name: str, unit: str, values: Sequence[float], goal: str) -> Figure:
+        """Return the figure of measured values."""
+        found = tuple(sorted(values))
+        middle = statistics.median(found)
+        return cls(name, unit, middle, found[0], found[-1], len(found), goal, found)
+
+
+def measure(name: str, unit: str, goal: str, runs: int, once: Callable[[], float]) -> Figure:
+    """Return the figure of `once`, called `runs` times after one call that is not counted."""
+    once()
+    return Figure.of(name, unit, [once() for _ in range(runs)], goal)

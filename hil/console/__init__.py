@@ -1,0 +1,1 @@
+"""The rig in a browser: runs, records, set-up and campaigns on one page."""

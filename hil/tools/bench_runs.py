@@ -1,0 +1,123 @@
+"""How many runs a core makes: along each path, with built-in laws and with an own one in Python.
+
+Processor time of one core is counted, so that others on the machine disturb the figures least.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from importlib.resources import files
+from pathlib import Path
+from random import Random
+from typing import TYPE_CHECKING
+
+from hil.analysis.speed import Figure, Plan, measure
+from hil.config.link import UART_BAUD
+from hil.config.load import load_scenario
+from hil.core.registries import OUTER_LAWS
+from hil.rigs.opening import open_rig
+from hil.runs.execute import RunSpec, execute_in_memory
+from sim_twin.setup import STEP_US, make_kernel
+
+if TYPE_CHECKING:
+    from hil.config.scenario import Scenario
+
+_X = "x real time"
+_STEPS = 20_000
+_DRIVING = (0.5, 0.3)  # duties of the plant alone
+
+
+def batch_figures(runs: int) -> list[Figure]:
+    """Return what one core does along each path that a run can take, and the plant alone."""
+    standing = load_scenario("scenario-1", ["duration_s=10"])
+    driving = load_scenario("circle", ["duration_s=10"])
+    plans: list[Plan] = []
+    for what, scenario, camera in (
+        ("pose camera, 10 s to a point", standing, "pose"),
+        ("pose camera, 10 s on a circle", driving, "pose"),
+        ("rendered camera, 10 s to a point", standing, "rendered"),
+    ):
+        plans += [
+            (what, _X, "", _times_real_time(scenario, camera, "asg-ism")),
+            (what, "runs/s", "", _runs_a_second(scenario, camera, "asg-ism")),
+        ]
+    plans += [
+        ("plant, board and encoders alone, standing", _X, "", lambda: 1e6 / kernel_us_a_s(False)),
+        ("plant, board and encoders alone, driven by a load", _X, "",
+         lambda: 1e6 / kernel_us_a_s(True)),
+        ("plant alone, driving", _X, "", lambda: 100.0 / plant_step_us()),
+    ]  # fmt: skip
+    return [measure(name, unit, goal, runs, once) for name, unit, goal, once in plans]
+
+
+def law_figures(runs: int) -> list[Figure]:
+    """Return what an own law in Python reaches (the file that `hil new law` writes), and built-in ones."""
+    scenario = load_scenario("circle", ["duration_s=10"])
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "bench_law.py"
+        text = (files("hil") / "data" / "templates" / "law.py").read_text(encoding="utf-8")
+        file.write_text(text.replace("my-thing", "bench-law"), encoding="utf-8")
+        own = OUTER_LAWS.get(str(file)).name
+        plans: list[Plan] = [
+            (f"whole loop with {what}", _X, "", _times_real_time(scenario, "pose", law))
+            for what, law in (("an own law in Python", own), ("asg-ism", "asg-ism"), ("pid", "pid"))
+        ]
+        return [measure(name, unit, goal, runs, once) for name, unit, goal, once in plans]
+
+
+def _simulated(scenario: Scenario, camera: str, outer: str) -> float:
+    """Make one run in memory, as a campaign does, and return the time that passed on its rig, s."""
+    spec = RunSpec(scenario, "twin", camera, outer, "asg-ism", 1, Path(), rerun=False)
+    rig = open_rig("twin", scenario, camera, spec.seed)
+    begin_s = rig.now_s()
+    record = execute_in_memory(spec, rig)
+    record.verdicts()
+    return rig.now_s() - begin_s
+
+
+def _times_real_time(scenario: Scenario, camera: str, outer: str) -> Callable[[], float]:
+    def once() -> float:
+        start_s = time.process_time()
+        simulated_s = _simulated(scenario, camera, outer)
+        return simulated_s / (time.process_time() - start_s)
+
+    return once
+
+
+def _runs_a_second(scenario: Scenario, camera: str, outer: str) -> Callable[[], float]:
+    def once() -> float:
+        start_s = time.process_time()
+        _simulated(scenario, camera, outer)
+        return 1.0 / (time.process_time() - start_s)
+
+    return once
+
+
+def kernel_us_a_s(moved: bool) -> float:
+    """Return microseconds of processor time per simulated second of plant, firmware core and encoders.
+
+    `moved`: a load turns the wheels all the time; else the robot stands.
+    """
+    from hil.config.events import Disturbance  # noqa: PLC0415 - for this figure only
+
+    pushes = [Disturbance(target="force_forward_n", shape="step", amplitude=8.0)] if moved else []
+    kernel = make_kernel(load_scenario("scenario-1").robot, UART_BAUD, Random(1), pushes)
+    kernel.begin(0)
+    end_us = _STEPS * STEP_US
+    start_s = time.process_time()
+    while kernel.advance(end_us) < end_us:
+        kernel.take_sent()
+    return (time.process_time() - start_s) / (end_us * 1e-6) * 1e6
+
+
+def plant_step_us() -> float:
+    """Return microseconds of processor time of one 1e-4 s step of the robot alone, driving."""
+    from sim_twin import _native  # noqa: PLC0415 - for this figure only
+    from sim_twin.setup import plant_params  # noqa: PLC0415
+
+    plant = _native.Plant(plant_params(load_scenario("scenario-1").robot))
+    start_s = time.process_time()
+    plant.run(_STEPS, 1e-6 * STEP_US, *_DRIVING, None)
+    return (time.process_time() - start_s) / _STEPS * 1e6

@@ -1,0 +1,100 @@
+"""Measuring and searching of colour marks, compiled from vision/native.
+
+World axes and metres; pixels with (0, 0) at the centre of the first; images (H, W, 3) uint8 BGR.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Image = NDArray[np.uint8]
+Point = tuple[float, float]
+Place = Sequence[float]
+"""A place of one mark: x_m, y_m on the marks' plane, and what it loses in score."""
+
+class Camera:
+    """What vision.camera.CameraModel says: fx, fy, cx, cy; k1, k2, p1, p2, k3; R_world_cam row by row."""
+
+    def __init__(
+        self,
+        lens: Sequence[float],
+        distortion: Sequence[float],
+        rotation: Sequence[float],
+        centre_m: Sequence[float],
+    ) -> None: ...
+
+class Disc:
+    """One fitted disc, seen in the image."""
+
+    @property
+    def u_px(self) -> float:
+        """Image of its centre, to the right."""
+
+    @property
+    def v_px(self) -> float:
+        """Image of its centre, down."""
+
+    @property
+    def radius_px(self) -> float:
+        """Radius that a disc of the known size has there."""
+
+    @property
+    def growth(self) -> float:
+        """Its radius over the known one, less 1."""
+
+    @property
+    def share(self) -> float:
+        """The part of its rim that was seen."""
+
+    @property
+    def residual_px(self) -> float:
+        """RMS of the edges off the fit."""
+
+    @property
+    def covariance_px2(self) -> tuple[float, float, float]:
+        """Claimed covariance of (u, v): uu, uv, vv."""
+
+    @property
+    def contrast_dn(self) -> float:
+        """Colour response inside its rim."""
+
+    @property
+    def ground_ratio(self) -> float:
+        """Brightness beside it over its own."""
+
+class RimFitter:
+    """Fits both marks at their rims; `middle_px` is where a mark has its typical size."""
+
+    def __init__(
+        self,
+        camera: Camera,
+        radius_m: float,
+        height_m: float,
+        weights: Sequence[Sequence[float]],
+        middle_px: Point,
+    ) -> None: ...
+    def fit(self, image: Image, centres_m: Sequence[Point]) -> tuple[Disc, Disc] | None:
+        """Return both discs from guesses of their centres; None where one is not there."""
+
+class MarkSearch:
+    """Looks for marks in shrunk pictures; `hues` are their directions among the two chromas."""
+
+    def __init__(
+        self,
+        camera: Camera,
+        radius_m: float,
+        height_m: float,
+        distance_m: float,
+        hues: Sequence[Sequence[float]],
+    ) -> None: ...
+    def places(
+        self, image: Image, origin_px: Point, shrink: int
+    ) -> tuple[list[Place], list[Place]]:
+        """Return the places of both marks, least loss first.
+
+        `origin_px` is where the picture's first pixel has its centre in the full one.
+        """
+
+    def pairs(self, front: Sequence[Place], rear: Sequence[Place]) -> list[tuple[Point, Point]]:
+        """Return the likeliest pairs of centres about the robot's distance apart, best first."""

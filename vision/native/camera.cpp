@@ -1,0 +1,72 @@
+#include "camera.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace vision {
+namespace {
+
+constexpr int kNewtonSteps = 20;
+constexpr double kNewtonTolerance = 1e-13;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace
+
+Vec2 Camera::distort(Vec2 at) const {
+  const auto& [k1, k2, p1, p2, k3] = distortion;
+  const double r2 = at.x * at.x + at.y * at.y;
+  const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  const double xy2 = 2.0 * at.x * at.y;
+  return {at.x * radial + p1 * xy2 + p2 * (r2 + 2.0 * at.x * at.x),
+          at.y * radial + p1 * (r2 + 2.0 * at.y * at.y) + p2 * xy2};
+}
+
+Vec2 Camera::project(Vec2 point_m, double z_m) const {
+  const auto& r = rotation;
+  const double dx = point_m.x - centre_m[0];
+  const double dy = point_m.y - centre_m[1];
+  const double dz = z_m - centre_m[2];
+  const double zc = r[2] * dx + r[5] * dy + r[8] * dz;
+  if (!(zc > 0.0)) {
+    return {kNaN, kNaN};
+  }
+  const Vec2 d = distort({(r[0] * dx + r[3] * dy + r[6] * dz) / zc,
+                          (r[1] * dx + r[4] * dy + r[7] * dz) / zc});
+  return {lens[0] * d.x + lens[2], lens[1] * d.y + lens[3]};
+}
+
+Vec2 Camera::normalise(Vec2 px) const {
+  const auto& [k1, k2, p1, p2, k3] = distortion;
+  const Vec2 target = {(px.x - lens[2]) / lens[0], (px.y - lens[3]) / lens[1]};
+  Vec2 at = target;
+  for (int step = 0; step < kNewtonSteps; ++step) {
+    const Vec2 rest = target - distort(at);
+    const double r2 = at.x * at.x + at.y * at.y;
+    const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+    const double slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3));
+    const double cross = at.x * at.y * slope + 2.0 * p1 * at.x + 2.0 * p2 * at.y;
+    const double xx = radial + at.x * at.x * slope + 2.0 * p1 * at.y + 6.0 * p2 * at.x;
+    const double yy = radial + at.y * at.y * slope + 6.0 * p1 * at.y + 2.0 * p2 * at.x;
+    const double det = xx * yy - cross * cross;
+    const Vec2 move = {(yy * rest.x - cross * rest.y) / det, (xx * rest.y - cross * rest.x) / det};
+    at = at + move;
+    if (std::abs(move.x) + std::abs(move.y) < kNewtonTolerance) {
+      return at;
+    }
+  }
+  return {kNaN, kNaN};
+}
+
+Vec2 Camera::floor_point(Vec2 px, double height_m) const {
+  const Vec2 at = normalise(px);
+  const auto& r = rotation;
+  const double dz = r[6] * at.x + r[7] * at.y + r[8];
+  const double reach = (height_m - centre_m[2]) / dz;
+  if (!(reach > 0.0)) {
+    return {kNaN, kNaN};
+  }
+  return {centre_m[0] + reach * (r[0] * at.x + r[1] * at.y + r[2]),
+          centre_m[1] + reach * (r[3] * at.x + r[4] * at.y + r[5])};
+}
+
+}  // namespace vision

@@ -1,0 +1,35 @@
+// Pinhole camera with five-term distortion over a floor: vision/camera.py, for the inner loops.
+// World axes and metres, pixels with (0, 0) at the centre of the first; NaN where there is no answer.
+#pragma once
+
+#include <array>
+
+namespace vision {
+
+struct Vec2 {
+  double x = 0.0;
+  double y = 0.0;
+};
+
+inline Vec2 operator+(Vec2 a, Vec2 b) { return {a.x + b.x, a.y + b.y}; }
+inline Vec2 operator-(Vec2 a, Vec2 b) { return {a.x - b.x, a.y - b.y}; }
+inline Vec2 operator*(double k, Vec2 a) { return {k * a.x, k * a.y}; }
+inline double dot(Vec2 a, Vec2 b) { return a.x * b.x + a.y * b.y; }
+
+struct Camera {
+  std::array<double, 4> lens;        // fx, fy, cx, cy, px
+  std::array<double, 5> distortion;  // k1, k2, p1, p2, k3
+  std::array<double, 9> rotation;    // R_world_cam, row by row
+  std::array<double, 3> centre_m;    // t_world_cam
+
+  // The pixel of a world point.
+  Vec2 project(Vec2 point_m, double z_m) const;
+  // Where the ray of a pixel meets the plane z = height.
+  Vec2 floor_point(Vec2 px, double height_m) const;
+
+ private:
+  Vec2 distort(Vec2 at) const;
+  Vec2 normalise(Vec2 px) const;
+};
+
+}  // namespace vision

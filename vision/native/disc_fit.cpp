@@ -1,0 +1,415 @@
+#include "disc_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace vision {
+namespace {
+
+constexpr double kTurn = 6.283185307179586;
+constexpr int kSteps = 6;
+// Before them the centroid of the response, twice: of points in rings up to 1.5 radii.
+constexpr int kCentroids = 2;
+constexpr double kCentredPx = 1.0;  // after a move shorter than that one is enough
+constexpr int kPolarRays = 16;
+constexpr std::array<double, 6> kPolarRadii = {0.3, 0.6, 0.85, 1.05, 1.25, 1.5};
+constexpr double kCentroidLevel = 0.4;  // of the way from the surroundings to the highest response
+// A step this short ends the fit; after one longer than that all rays count again.
+constexpr double kSettledPx = 0.03;
+constexpr double kRekeepPx = 0.5;
+constexpr double kOutlierSigmas = 3.0;
+// Of five rays side by side, more of which must have an edge for that in the middle.
+constexpr int kBesideMin = 3;
+constexpr double kEdgeSigmaMinPx = 0.05;
+// Doubt of the radius before the fit, relative, as a pull towards the known one.
+constexpr double kRadiusSigma = 0.02;
+constexpr double kRadiusPull = (0.15 / kRadiusSigma) * (0.15 / kRadiusSigma);
+// How much more noise there is in one turn of the rim than in two to four of them; the more so, the
+// more of it is shared by neighbouring rays; that which varies twice may be blur.
+constexpr double kNoiseRatio = 1.3;
+constexpr double kNoiseSlope = 0.4;
+// What no residual shows: lens model, interpolation, light within a profile.
+constexpr double kFreeRatio = 0.0008;  // of the radius
+constexpr double kFreePx = 0.004;
+
+using Matrix = std::array<Move, 3>;
+
+int count(const Mask& keep) { return static_cast<int>(std::count(keep.begin(), keep.end(), true)); }
+
+double dot3(const Move& a, const Move& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+Matrix normal(const std::array<Move, kRays>& rows, const Mask& keep) {
+  Matrix n = {};
+  for (int ray = 0; ray < kRays; ++ray) {
+    for (int i = 0; keep[ray] && i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        n[i][j] += rows[ray][i] * rows[ray][j];
+      }
+    }
+  }
+  n[2][2] += kRadiusPull;
+  return n;
+}
+
+// The inverse of a symmetric matrix; none where there is none.
+std::optional<Matrix> inverse(const Matrix& m) {
+  const double a = m[1][1] * m[2][2] - m[1][2] * m[1][2];
+  const double b = m[0][2] * m[1][2] - m[0][1] * m[2][2];
+  const double c = m[0][1] * m[1][2] - m[0][2] * m[1][1];
+  const double det = m[0][0] * a + m[0][1] * b + m[0][2] * c;
+  if (!(det > 0.0)) {
+    return std::nullopt;
+  }
+  const double d = m[0][0] * m[2][2] - m[0][2] * m[0][2];
+  const double e = m[0][1] * m[0][2] - m[0][0] * m[1][2];
+  const double f = m[0][0] * m[1][1] - m[0][1] * m[0][1];
+  return Matrix{{{a / det, b / det, c / det}, {b / det, d / det, e / det}, {c / det, e / det, f / det}}};
+}
+
+// Usable rays whose levels hold nothing of a cover's: levels are means over neighbouring rays, and two
+// rays side by side that show no edge are something in front; one alone is noise.
+Mask clear_of_cover(const Mask& usable) {
+  Mask clear;
+  for (int ray = 0; ray < kRays; ++ray) {
+    const auto shown = [&](int away) { return usable[(ray + away + kRays) % kRays]; };
+    int beside = 0;
+    for (int k = -2; k <= 2; ++k) {
+      beside += shown(k) ? 1 : 0;
+    }
+    clear[ray] = usable[ray] && beside > kBesideMin;
+    for (int k = -kLevelRays / 2 - 1; k <= kLevelRays / 2; ++k) {
+      clear[ray] = clear[ray] && (shown(k) || shown(k + 1));
+    }
+  }
+  return clear;
+}
+
+// (du, dv, growth) by least squares; none when too little of the rim is left.
+std::optional<Move> solved(const std::array<Move, kRays>& rows, const Round& shift,
+                           const Mask& keep) {
+  if (count(keep) < kRays / 6) {
+    return std::nullopt;
+  }
+  const std::optional<Matrix> covariance = inverse(normal(rows, keep));
+  if (!covariance) {
+    return std::nullopt;
+  }
+  Move right = {};
+  for (int ray = 0; ray < kRays; ++ray) {
+    for (int i = 0; keep[ray] && i < 3; ++i) {
+      right[i] += rows[ray][i] * shift[ray];
+    }
+  }
+  return Move{dot3((*covariance)[0], right), dot3((*covariance)[1], right),
+              dot3((*covariance)[2], right)};
+}
+
+// A robust standard deviation of kept residuals: 1.48 of their median.
+double spread(const Round& rest, const Mask& keep) {
+  std::array<double, kRays> kept;
+  int n = 0;
+  for (int ray = 0; ray < kRays; ++ray) {
+    if (keep[ray]) {
+      kept[n++] = rest[ray];
+    }
+  }
+  std::nth_element(kept.begin(), kept.begin() + n / 2, kept.begin() + n);
+  return std::max(1.4826 * kept[n / 2], kEdgeSigmaMinPx);
+}
+
+// (du, dv, growth) without the rays far off the fit, which leave `keep`; `tries` times to find them.
+std::optional<Move> robust(const std::array<Move, kRays>& rows, const Round& shift,
+                           const Mask& usable, int tries, Mask& keep) {
+  for (int i = 0; i < tries; ++i) {
+    const std::optional<Move> move = solved(rows, shift, keep);
+    if (!move) {
+      return std::nullopt;
+    }
+    Round rest;
+    for (int ray = 0; ray < kRays; ++ray) {
+      rest[ray] = std::abs(shift[ray] - dot3(rows[ray], *move));
+    }
+    const double limit = kOutlierSigmas * spread(rest, keep);
+    Mask within;
+    for (int ray = 0; ray < kRays; ++ray) {
+      within[ray] = usable[ray] && rest[ray] < limit;
+    }
+    if (within == keep) {
+      return move;
+    }
+    keep = within;
+  }
+  return solved(rows, shift, keep);
+}
+
+// Cosines and sines of two to four turns of the rim.
+using Waves = std::array<std::array<double, kRays>, 6>;
+const Waves& waves() {
+  static const Waves kept = [] {
+    Waves all;
+    for (int turns = 2; turns <= 4; ++turns) {
+      for (int ray = 0; ray < kRays; ++ray) {
+        all[turns - 2][ray] = std::cos(kTurn * ray / kRays * turns);
+        all[turns + 1][ray] = std::sin(kTurn * ray / kRays * turns);
+      }
+    }
+    return all;
+  }();
+  return kept;
+}
+
+// The variance that the residuals show to move the centre.
+//
+// That noise varies once round the rim; the fit has taken it up. What is left has that which varies
+// two to four times, noise of nearly the same kind: pixels and blocks shared by neighbouring rays,
+// light, cover.
+double noise_of(const Round& rest, int kept) {
+  double slow = 0.0;
+  double shared = 0.0;
+  for (int i = 0; i < 6; ++i) {
+    double sum = 0.0;
+    for (int ray = 0; ray < kRays; ++ray) {
+      sum += rest[ray] * waves()[i][ray];
+    }
+    const double power = sum * sum * (2.0 / kept);
+    slow += power / 6.0;
+    shared += i % 3 == 0 ? 0.0 : power / 4.0;
+  }
+  double squares = 0.0;
+  for (const double r : rest) {
+    squares += r * r;
+  }
+  const double fast = squares / std::max(kept - 3, 1);
+  const double ratio = std::max(shared / std::max(fast, 1e-12), 1.0);
+  return kNoiseRatio * std::max(slow, fast) * std::pow(ratio, kNoiseSlope);
+}
+
+// Turn the covariance for a noise of 1 px into that for what was seen.
+void claim(Disc& disc, double variance) {
+  const double ratio = kFreeRatio * disc.radius_px;
+  const double free = ratio * ratio + kFreePx * kFreePx;
+  auto& [uu, uv, vv] = disc.covariance_px2;
+  uu = uu * variance + free;
+  uv = uv * variance;
+  vv = vv * variance + free;
+}
+
+}  // namespace
+
+RimFitter::RimFitter(const Camera& camera, double radius_m, double height_m,
+                     const std::array<Colour, 2>& weights, Vec2 middle_px)
+    : camera_(camera),
+      radius_m_(radius_m),
+      height_m_(height_m),
+      weights_(weights),
+      profiles_(1.0) {
+  for (int ray = 0; ray < kRays; ++ray) {
+    const double angle = kTurn * ray / kRays;
+    circle_m_[ray] = {radius_m_ * std::cos(angle), radius_m_ * std::sin(angle)};
+  }
+  if (const std::optional<Shape> typical = shape(middle_px)) {
+    profiles_ = Profiles(typical->radius_px);
+  }
+}
+
+std::optional<RimFitter::Shape> RimFitter::shape(Vec2 px) const {
+  const Vec2 floor = camera_.floor_point(px, height_m_);
+  const Vec2 centre = camera_.project(floor, height_m_);
+  Shape found;
+  double reach = 0.0;
+  for (int ray = 0; ray < kRays; ++ray) {
+    found.arms[ray] = camera_.project(floor + circle_m_[ray], height_m_) - centre;
+    reach = std::max({reach, std::abs(found.arms[ray].x), std::abs(found.arms[ray].y)});
+  }
+  double radius = 0.0;
+  for (int ray = 0; ray < kRays; ++ray) {
+    const Vec2 along = found.arms[(ray + 1) % kRays] - found.arms[(ray + kRays - 1) % kRays];
+    // Seen from above a circle keeps its turning sense, and image rows run down.
+    found.normals[ray] = 1.0 / std::hypot(along.x, along.y) * Vec2{-along.y, along.x};
+    radius += dot(found.normals[ray], found.arms[ray]) / kRays;
+  }
+  if (!(radius > 1.0)) {
+    return std::nullopt;
+  }
+  found.radius_px = radius;
+  found.step_px = reach_px(radius) / profiles_.edge();
+  found.room_px = reach + found.step_px * profiles_.half() + 1.0;
+  return found;
+}
+
+std::optional<Vec2> RimFitter::centred(const Picture& picture, Vec2 px,
+                                       const Colour& weights) const {
+  const std::optional<Shape> rim = shape(px);
+  if (!rim) {
+    return std::nullopt;
+  }
+  std::array<double, kPolarRadii.size() * kPolarRays> value;
+  std::array<double, kPolarRays> outer;
+  double top = -std::numeric_limits<double>::infinity();
+  for (std::size_t ring = 0; ring < kPolarRadii.size(); ++ring) {
+    for (int i = 0; i < kPolarRays; ++i) {
+      const Vec2 arm = kPolarRadii[ring] * rim->arms[i * (kRays / kPolarRays)];
+      value[ring * kPolarRays + i] = outer[i] = response(picture.between(px + arm), weights);
+      top = std::max(top, outer[i]);
+    }
+  }
+  std::nth_element(outer.begin(), outer.begin() + kPolarRays / 2, outer.end());
+  const double base = outer[kPolarRays / 2];
+  const double level = base + kCentroidLevel * (top - base);
+  Vec2 move;
+  double total = 0.0;
+  for (std::size_t k = 0; k < value.size(); ++k) {
+    const double radius = kPolarRadii[k / kPolarRays];
+    const double weight = std::max(value[k] - level, 0.0) * radius;
+    move = move + weight * radius * rim->arms[k % kPolarRays * (kRays / kPolarRays)];
+    total += weight;
+  }
+  return px + 1.0 / std::max(total, 1e-6) * move;
+}
+
+Mask RimFitter::within(const Picture& picture, Vec2 px, const Shape& shape) const {
+  Mask seen;
+  const double reach = shape.step_px * profiles_.half();
+  for (int ray = 0; ray < kRays; ++ray) {
+    const Vec2 at = px + shape.arms[ray];
+    seen[ray] = picture.holds(at + reach * shape.normals[ray]) &&
+                picture.holds(at - reach * shape.normals[ray]);
+  }
+  return seen;
+}
+
+bool RimFitter::step(const Picture& picture, Vec2 px, const Colour& weights, const Mask* keep,
+                     Step& done) const {
+  const std::optional<Shape> rim = shape(px);
+  if (!rim) {
+    return false;
+  }
+  done.shape = *rim;
+  done.from_px = px;
+  const int samples = profiles_.samples();
+  std::vector<float> values(kRays * samples);
+  for (int ray = 0; ray < kRays; ++ray) {
+    for (int i = 0; i < samples; ++i) {
+      const double out = rim->step_px * (i - profiles_.half());
+      const Vec2 at = px + rim->arms[ray] + out * rim->normals[ray];
+      values[ray * samples + i] = response(picture.between(at), weights);
+    }
+  }
+  done.edges = profiles_.edges(values);
+  const Mask seen = within(picture, px, *rim);
+  Mask usable;
+  for (int ray = 0; ray < kRays; ++ray) {
+    usable[ray] = done.edges.usable[ray] && seen[ray];
+  }
+  const Mask whole = clear_of_cover(usable);
+  double information = 0.0;
+  for (const double noise : done.edges.noise) {
+    information += 1.0 / (noise * noise * kRays);
+  }
+  const double scale = 1.0 / std::sqrt(information);
+  for (int ray = 0; ray < kRays; ++ray) {
+    const double weight = scale / done.edges.noise[ray];
+    const Vec2 n = rim->normals[ray];
+    const double pull = done.edges.gain[ray] * weight;
+    done.rows[ray] = {n.x * pull, n.y * pull, dot(n, rim->arms[ray]) * pull};
+    done.shift[ray] = done.edges.shift[ray] * rim->step_px * weight;
+  }
+  done.keep = whole;
+  for (int ray = 0; keep != nullptr && ray < kRays; ++ray) {
+    done.keep[ray] = whole[ray] && (*keep)[ray];
+  }
+  const std::optional<Move> move =
+      robust(done.rows, done.shift, whole, keep == nullptr ? 2 : 1, done.keep);
+  if (move) {
+    done.move = *move;
+  }
+  return move.has_value();
+}
+
+Disc RimFitter::disc(const Picture& picture, const Step& step, double& variance) const {
+  const auto& [du, dv, growth] = step.move;
+  Round rest = {};
+  std::vector<float> ratios;
+  double squares = 0.0;
+  const auto brightness = [&](int ray, int first) {
+    float sum = 0.0F;
+    for (int i = first; i < first + 2; ++i) {
+      const double out = step.shape.step_px * (i - profiles_.half());
+      const Vec2 at = step.from_px + step.shape.arms[ray] + out * step.shape.normals[ray];
+      const Colour c = picture.between(at);
+      sum += c.b + c.g + c.r;
+    }
+    return sum;
+  };
+  for (int ray = 0; ray < kRays; ++ray) {
+    if (step.keep[ray]) {
+      rest[ray] = step.shift[ray] - dot3(step.rows[ray], step.move);
+      squares += rest[ray] * rest[ray];
+      ratios.push_back(brightness(ray, profiles_.ground()) /
+                       std::max(brightness(ray, profiles_.own()), 1.0F));
+    }
+  }
+  const int kept = static_cast<int>(ratios.size());
+  std::nth_element(ratios.begin(), ratios.begin() + kept / 2, ratios.end());
+  variance = noise_of(rest, kept);
+  const Matrix centre = inverse(normal(step.rows, step.keep)).value_or(Matrix{});
+  return Disc{step.from_px.x + du,
+              step.from_px.y + dv,
+              step.shape.radius_px,
+              growth,
+              static_cast<double>(kept) / kRays,
+              std::sqrt(squares / kept),
+              {centre[0][0], centre[0][1], centre[1][1]},
+              step.edges.typical_dn,
+              ratios[kept / 2]};
+}
+
+std::optional<std::array<Disc, 2>> RimFitter::fit(const Picture& picture,
+                                                  const std::array<Vec2, 2>& centres_m) const {
+  std::array<Vec2, 2> px = {camera_.project(centres_m[0], height_m_),
+                            camera_.project(centres_m[1], height_m_)};
+  for (int i = 0; i < kCentroids; ++i) {
+    double far_px = 0.0;
+    for (int k = 0; k < 2; ++k) {
+      const std::optional<Vec2> moved = centred(picture, px[k], weights_[k]);
+      if (!moved) {
+        return std::nullopt;
+      }
+      far_px = std::max({far_px, std::abs(moved->x - px[k].x), std::abs(moved->y - px[k].y)});
+      px[k] = *moved;
+    }
+    if (far_px < kCentredPx) {
+      break;
+    }
+  }
+  std::array<Step, 2> steps;
+  std::array<Mask, 2> keep;
+  bool all_rays = true;
+  for (int i = 0; i < kSteps; ++i) {
+    double far_px = 0.0;
+    for (int k = 0; k < 2; ++k) {
+      if (!step(picture, px[k], weights_[k], all_rays ? nullptr : &keep[k], steps[k])) {
+        return std::nullopt;
+      }
+      const Move& move = steps[k].move;
+      px[k] = px[k] + Vec2{move[0], move[1]};
+      keep[k] = steps[k].keep;
+      far_px = std::max({far_px, std::abs(move[0]), std::abs(move[1])});
+    }
+    if (far_px < kSettledPx) {
+      break;
+    }
+    all_rays = far_px > kRekeepPx;
+  }
+  std::array<double, 2> variance;
+  std::array<Disc, 2> discs = {disc(picture, steps[0], variance[0]),
+                               disc(picture, steps[1], variance[1])};
+  const double shared = 0.5 * (variance[0] + variance[1]);
+  for (int k = 0; k < 2; ++k) {
+    claim(discs[k], std::max(variance[k], 0.5 * (variance[k] + shared)));
+  }
+  return discs;
+}
+
+}  // namespace vision

@@ -1,0 +1,169 @@
+#include "rims.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace vision {
+namespace {
+
+constexpr int kGainRays = 9;  // over which gain and noise are
+// How far from the rim an edge is looked for, and how far beyond that its two levels are taken, in
+// radii. The longer, the more noise gets in; blur at 0.5 m/s over 20 ms is 0.17 each way.
+constexpr std::array<std::pair<double, double>, kLengths> kReaches = {
+    {{0.18, 0.3}, {0.35, 0.2}, {0.52, 0.15}}};
+constexpr double kReachMinPx = 1.6;
+// A ray counts when its step is this share of the disc's typical one, and its edge in the profile.
+constexpr double kStepShare = 0.3;
+constexpr double kShiftShare = 0.8;
+constexpr double kResponseMinDn = 6.0;
+constexpr double kGainMin = 0.02;
+
+// Means over neighbouring rays, an odd number of them.
+Round about(const Round& values, int rays) {
+  const int side = rays / 2;
+  double sum = 0.0;
+  Round means;
+  for (int i = -side; i <= side; ++i) {
+    sum += values[(i + kRays) % kRays];
+  }
+  for (int i = 0; i < kRays; ++i) {
+    means[i] = sum / rays;
+    sum += values[(i + side + 1) % kRays] - values[(i - side + kRays) % kRays];
+  }
+  return means;
+}
+
+// Level, gain and shift of the profiles of one length.
+struct Length {
+  Round rise, level, gain, shift, inner;
+};
+
+// Running sums of the profile of each ray, kRays x (samples + 1).
+std::vector<double> running(const std::vector<float>& response, int samples) {
+  std::vector<double> sums(kRays * (samples + 1));
+  for (int ray = 0; ray < kRays; ++ray) {
+    double* s = &sums[ray * (samples + 1)];
+    const float* r = &response[ray * samples];
+    s[0] = 0.0;
+    for (int i = 0; i < samples; ++i) {
+      s[i + 1] = s[i] + r[i];
+    }
+  }
+  return sums;
+}
+
+struct Swing {
+  Round rise, swing, inner;
+};
+
+// How far between its two levels the mean of each profile is: -1 all outside, 1 all inside.
+Swing swing(const std::vector<float>& response, const std::vector<double>& sums, int samples,
+            int middle, int edge, int level) {
+  Round inner, outer, between;
+  for (int ray = 0; ray < kRays; ++ray) {
+    const double* s = &sums[ray * (samples + 1)];
+    const float* r = &response[ray * samples];
+    const int first = middle - edge;
+    const int last = middle + edge;
+    inner[ray] = (s[first] - s[first - level]) / level;
+    outer[ray] = (s[last + 1 + level] - s[last + 1]) / level;
+    between[ray] = (s[last + 1] - s[first] - 0.5 * (r[first] + r[last])) * (0.5 / edge);
+  }
+  const Round low = about(outer, kLevelRays);
+  const Round high = about(inner, kLevelRays);
+  Swing found;
+  found.inner = inner;
+  for (int ray = 0; ray < kRays; ++ray) {
+    found.rise[ray] = high[ray] - low[ray];
+    found.swing[ray] = 2.0 * (between[ray] - low[ray]) / std::max(found.rise[ray], 1.0) - 1.0;
+  }
+  return found;
+}
+
+// Take level and gain from across the disc where that rises more: blur is the same on both sides,
+// what covers one side is no blur.
+void take_better_side(Round& level, Round& gain) {
+  for (int ray = 0; ray < kRays / 2; ++ray) {
+    const int across = ray + kRays / 2;
+    const int from = level[ray] >= level[across] ? ray : across;
+    level[ray] = level[across] = level[from];
+    gain[ray] = gain[across] = gain[from];
+  }
+}
+
+}  // namespace
+
+double reach_px(double radius_px) {
+  const double reach = std::max(kReaches[kLengths - 1].first * radius_px, kReachMinPx);
+  return std::min(reach, 0.8 * radius_px);
+}
+
+Profiles::Profiles(double radius_px) : half_(0) {
+  for (int k = 0; k < kLengths; ++k) {
+    const auto [reach, level] = kReaches[k];
+    edge_[k] = static_cast<int>(std::ceil(std::max(reach * radius_px, kReachMinPx)));
+    level_[k] = std::max(2, static_cast<int>(std::nearbyint(level * radius_px)));
+    half_ = std::max(half_, edge_[k] + level_[k] + 1);
+  }
+}
+
+Edges Profiles::edges(const std::vector<float>& response) const {
+  const int n = samples();
+  const std::vector<double> sums = running(response, n);
+  std::array<Length, kLengths> lengths;
+  for (int k = 0; k < kLengths; ++k) {
+    Length& own = lengths[k];
+    const int e = edge_[k];
+    const Swing here = swing(response, sums, n, half_, e, level_[k]);
+    const Swing in = swing(response, sums, n, half_ - 1, e, level_[k]);
+    const Swing out = swing(response, sums, n, half_ + 1, e, level_[k]);
+    own.rise = here.rise;
+    own.inner = here.inner;
+    Round slope;
+    for (int ray = 0; ray < kRays; ++ray) {
+      slope[ray] = (in.swing[ray] - out.swing[ray]) * (0.5 * e);
+      own.shift[ray] = here.swing[ray] * e;
+    }
+    own.gain = about(slope, kGainRays);
+    own.level = about(own.rise, kGainRays);
+    for (double& level : own.level) {
+      level = std::max(level, 1.0);
+    }
+    take_better_side(own.level, own.gain);
+  }
+  Edges found;
+  Round step, inner;
+  std::array<int, kRays> best;
+  for (int ray = 0; ray < kRays; ++ray) {
+    double most = -1.0;
+    for (int k = 0; k < kLengths; ++k) {
+      const double gain = std::clamp(lengths[k].gain[ray], kGainMin, 1.0);
+      // Levels are shared by neighbouring rays, which does not average them over a whole disc.
+      const double scatter = 2.0 * edge_[k] * std::sqrt(0.5 / edge_[k] + 0.5 / level_[k]);
+      const double noise = scatter / lengths[k].level[ray];
+      if (gain / noise > most) {
+        most = gain / noise;
+        best[ray] = k;
+        found.gain[ray] = gain;
+        found.noise[ray] = noise;
+      }
+    }
+    const Length& own = lengths[best[ray]];
+    step[ray] = own.rise[ray];
+    inner[ray] = own.inner[ray];
+    found.shift[ray] = own.shift[ray];
+  }
+  Round ordered = inner;
+  std::nth_element(ordered.begin(), ordered.begin() + 3 * kRays / 4, ordered.end());
+  found.typical_dn = ordered[3 * kRays / 4];
+  const double least = std::max(kStepShare * found.typical_dn, kResponseMinDn);
+  for (int ray = 0; ray < kRays; ++ray) {
+    const double room = kShiftShare * edge_[best[ray]];
+    found.usable[ray] =
+        std::min(step[ray], inner[ray]) > least && std::abs(found.shift[ray]) < room;
+  }
+  return found;
+}
+
+}  // namespace vision
