@@ -246,7 +246,7 @@ def _deck(deck: str | Deck | Sequence[str], laws: Iterable[str] | None) -> Deck:
         chosen = load.build(Deck, {"scenarios": list(deck)}, "deck")
     if laws is None:
         return chosen
-    tree = {"scenarios": chosen.scenarios, "laws": [_law_name(law) for law in laws]}
+    tree = chosen.model_dump(mode="json") | {"laws": [_law_name(law) for law in laws]}
     return load.build(Deck, tree, "deck")
 
 

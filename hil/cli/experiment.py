@@ -24,6 +24,8 @@ from hil.cli.options import (
 from hil.cli.progress import run_progress
 from hil.core.text import visible
 
+UNTIL_MOST = 1000
+
 
 @click.command("experiment")
 @click.argument("deck", default="thesis")
@@ -34,6 +36,11 @@ from hil.core.text import visible
 @camera_option
 @click.option("--repeats", type=click.IntRange(1, 10_000), default=1, show_default=True,
               help="Runs of each scenario and law, with seeds counting up from --seed.")  # fmt: skip
+@click.option("--until-interval", type=click.FloatRange(min=0.0, min_open=True), metavar="X",
+              help="Repeat until half the 95 % interval of each paired difference is at most X, in the "
+              "unit of --until-figure; --repeats is then the most. [default most: 1000]")  # fmt: skip
+@click.option("--until-figure", default="iae_m_s", show_default=True, metavar="FIGURE",
+              help="The figure that --until-interval looks at.")  # fmt: skip
 @seed_option
 @set_option
 @out_option
@@ -47,6 +54,8 @@ def command(
     inner: str,
     camera: str | None,
     repeats: int,
+    until_interval: float | None,
+    until_figure: str,
     seed: int,
     overrides: tuple[str, ...],
     out: Path | None,
@@ -79,18 +88,26 @@ def command(
         writing,
     )
     from hil.study.side_by_side import run_all, run_name
+    from hil.study.until import Until
 
-    conditions = Conditions(target, camera, inner, seed, repeats, overrides, command_line())
+    until = None if until_interval is None else Until.of(until_figure, until_interval, target)
+    most = repeats if until is None or repeats > 1 else UNTIL_MOST
+    conditions = Conditions(target, camera, inner, seed, most, overrides, command_line())
     folder = out or new_folder("experiment")
     specs = deck_specs(load_deck(deck, outers), conditions, folder)
     warn_unfinished({spec.scenario.name: spec.scenario for spec in specs}.values())
     with junit_file(junit, f"experiment.{deck}"), writing(folder):
-        todo = claim(folder, specs, _say)
-        if len(todo) < len(specs):
-            _say(f"{len(specs) - len(todo)} of {len(specs)} runs are there already")
-        with run_progress({run_name(spec): spec.scenario.duration_s for spec in todo}) as update:
-            run_all(todo, update)
-    records = [read_run(spec.out) for spec in specs]
+        for wanted in [specs] if until is None else until.parts(specs, seed, most):
+            todo = claim(folder, wanted, _say)
+            if len(todo) < len(wanted):
+                _say(f"{len(wanted) - len(todo)} of {len(wanted)} runs are there already")
+            with run_progress(
+                {run_name(spec): spec.scenario.duration_s for spec in todo}
+            ) as update:
+                run_all(todo, update)
+            records = [read_run(spec.out) for spec in wanted]
+            if until is not None and until.reached(records, _say):
+                break
     report = folder / REPORT
     studies = study_by_scenario(records)
     with figures_kept(figures):

@@ -41,6 +41,13 @@ COMMANDS = {
         "Reproduce the thesis's numerical studies, chapters 4 to 8; judge its claims.",
     ),
     "tune": ("hil.cli.tune", "Tune the gains of laws by one procedure and budget."),
+    "verdict": (
+        "hil.cli.verdict",
+        "Compare all laws on tasks no search has seen; fronts, ablation.",
+    ),
+    "ablate": ("hil.cli.ablate", "Switch each part of a law off in turn: what it is worth."),
+    "falsify": ("hil.cli.falsify", "Search for the run that most violates a requirement."),
+    "power": ("hil.cli.power", "How many pairs of runs show a difference of a given size."),
     "faults": ("hil.cli.faults", "Break everything once: each fault at each instant."),
     "twin": ("hil.cli.twin", "Serve the digital twin to other programs."),
     "firmware": ("hil.cli.firmware", "Generate, build, upload and configure the firmware."),

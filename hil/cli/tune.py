@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -64,9 +64,13 @@ def command(
     SCENARIO... are the tasks: built-in names, TOML files, or one deck; the three scenarios of the
     thesis when none is given. Each is run calm, pushed, late and, where it goes to a point, beside it.
 
-    The result is a gain set with its origin. It is judged at once on a held-out tape: the tasks with
-    seeds no candidate has seen, all laws under the same ones. Some ten minutes of two cores; a
-    search that is interrupted keeps its runs in FILE.search, and the same command goes on.
+    A deck with conditions (`suite`) is split: the search sees one half of its tasks and conditions, and is
+    judged on the other (docs/verdict.md). Without one, the result is judged on the same tasks with
+    seeds no candidate has seen, which says nothing of other tasks.
+
+    The result is a gain set with its origin, judged at once, all laws under the same seeds. Some ten
+    minutes of two cores; a search that is interrupted keeps its runs in FILE.search, and the same command
+    goes on.
     """
     from hil.core.errors import BadInput
     from hil.study.campaign.results import program
@@ -118,7 +122,9 @@ def _searched(
     from hil.study.campaign.workers import Pool
     from hil.study.tuning_verdict import held_out_trials, judge, pairs_of, with_verdict
 
-    worker = tune.OnTarget("twin", camera, dict(tasks.scenarios) if tasks.own else {})
+    worker: Any = tune.OnTarget("twin", camera, dict(tasks.known) if tasks.own else {})
+    if tasks.conditions:
+        worker = _by_task(tasks, worker, workers)
     with stage_progress() as stage, Pool(worker, workers or os.cpu_count() or 1) as pool:
         steps: dict[str, Stage] = {}
 
@@ -140,13 +146,32 @@ def _searched(
         )
         pairs = pairs_of(laws)
         run = tuple(dict.fromkeys(law for pair in pairs for law in pair))
-        trials = held_out_trials(gains, repeats, tasks.names, run)
+        trials = held_out_trials(gains, repeats, tasks.judged, run)
         step = stage("held-out tape", len(trials))
         figures = journal.make(trials, pool.map, step.advance)
     verdicts = [judge(trials, figures, pair) for pair in pairs]
     for verdict in verdicts[::-1]:
         gains = with_verdict(gains, verdict)
     return gains, verdicts
+
+
+def _by_task(tasks: Tasks, worker: Any, workers: int | None) -> Any:
+    """Return a worker whose costs are normalised by what the yardstick gives on each task, calm."""
+    from hil.config.control import ControlConfig
+    from hil.study import suite
+    from hil.study.campaign.workers import Pool
+    from hil.study.tune import Case, Trial
+
+    gains = ControlConfig().active_gains
+    names = list(tasks.calm)
+    trials = [
+        Trial(suite.YARDSTICK_LAW, gains, Case(name, "calm", "asg-ism"), suite.YARDSTICK_SEED)
+        for name in names
+    ]
+    with Pool(worker, workers or os.cpu_count() or 1) as pool:
+        found = pool.map(trials, lambda _place, _figures: None)
+    usual = {name.partition("-in-")[0]: f for name, f in zip(names, found, strict=True)}
+    return suite.ByTask(worker, suite.Yardstick.of(usual))
 
 
 def _print(out: Path, gains: Gains, laws: Sequence[str], verdicts: Sequence[Verdict]) -> None:

@@ -189,6 +189,17 @@ class WaypointReference(ReferenceConfig):
     )
 
 
+class StopsReference(ReferenceConfig):
+    """Straight legs between points, each from rest to rest, with a pause at every point between."""
+
+    kind: Literal["stops"] = Field("stops", description="of this reference")
+    points_m: tuple[tuple[float, float], ...] = quantity(
+        "m", "world (X, Y) at which z1* rests, in order", min_length=2, max_length=200
+    )
+    speed_max_m_s: float = quantity("m/s", "bound on |d z1*/dt|", 0.3, gt=0, le=5)
+    pause_s: float = quantity("s", "rest at each point between two legs", 1.0, ge=0, le=60)
+
+
 class ControlConfig(Section):
     """The outer loop of a scenario."""
 

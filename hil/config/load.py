@@ -17,6 +17,7 @@ from hil.config.fields import told
 from hil.config.gains import shipped_gains
 from hil.config.limits import board_defaults, check_board
 from hil.config.own_settings import BY_NAME_KEY, PLACES, model_at, renew
+from hil.config.path_file import fill_path
 from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
@@ -133,6 +134,7 @@ def read_tree(name_or_path: str, kind: str, above: tuple[str, ...] = ()) -> Tree
             below = _part_tree(_beside(folder, str(own.pop("file"))), part, above)
             tree[part] = merge(below, own)
     _set_files_beside(tree, folder)
+    fill_path(tree, folder)
     base = tree.pop("base", None)
     if base is not None:
         below = read_tree(_beside(folder, str(base)), _base_kind(str(base), kind), above)

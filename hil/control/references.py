@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from itertools import pairwise
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from hil.config.control import CircleReference, PointReference, ReferenceConfig, WaypointReference
+from hil.config.control import (
+    CircleReference,
+    PointReference,
+    ReferenceConfig,
+    StopsReference,
+    WaypointReference,
+)
 from hil.core.errors import BadInput
 from hil.core.registries import REFERENCES
 from hil.core.types import ReferenceState
@@ -146,6 +153,29 @@ class Waypoints:
         return ReferenceState((x[0], y[0]), (x[1], y[1]), (x[2], y[2]), (x[3], y[3]))
 
 
+@REFERENCES.register(
+    "stops", settings=StopsReference, summary="straight legs from rest to rest, a pause between two"
+)
+class Stops:
+    """Legs of `Waypoints` between neighbouring points, one after the other."""
+
+    def __init__(self, config: StopsReference) -> None:
+        self._legs = [
+            Waypoints(WaypointReference(points_m=leg, speed_max_m_s=config.speed_max_m_s))
+            for leg in pairwise(config.points_m)
+        ]
+        self._begins_s = [0.0]
+        for leg in self._legs:
+            self._begins_s.append(self._begins_s[-1] + leg.duration_s + config.pause_s)
+        self.duration_s = self._begins_s[-1] - config.pause_s
+
+    def at(self, t_s: float) -> ReferenceState:
+        """Return the desired state; at rest before the start, in each pause, and after the end."""
+        number = max(bisect_right(self._begins_s, max(t_s, 0.0)) - 1, 0)
+        number = min(number, len(self._legs) - 1)
+        return self._legs[number].at(t_s - self._begins_s[number])
+
+
 _Poly = tuple[float, ...]
 _Piece = tuple[float, _Poly, _Poly]
 
@@ -223,6 +253,15 @@ def make_reference(config: ReferenceConfig) -> Reference:
 
 def unfinished(config: ReferenceConfig, duration_s: float) -> str | None:
     """Return a sentence when a run of `duration_s` ends before its reference does, else None."""
+    if isinstance(config, StopsReference):
+        needed_s = Stops(config).duration_s
+        if needed_s <= duration_s:
+            return None
+        return (
+            f"reference.points_m: the legs take {needed_s:.4g} s within speed_max_m_s = "
+            f"{config.speed_max_m_s:g} m/s and with pause_s = {config.pause_s:g} s, the run ends after "
+            f"{duration_s:g} s, and its figures judge no more than that; give duration_s more"
+        )
     if not isinstance(config, WaypointReference):
         return None
     reference = Waypoints(config)

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from hil.board.wheel_laws import WHEEL_LAWS
 from hil.config.fit import check_fit
 from hil.config.gains import only_gains_of
-from hil.config.load import load_scenario
 from hil.core.errors import BadInput
 from hil.core.files import PART, replace_file
 from hil.core.registries import source_digests
@@ -65,12 +64,12 @@ class Conditions:
 
 
 def deck_specs(deck: Deck, conditions: Conditions, folder: Path) -> list[RunSpec]:
-    """Return one spec per scenario, arm and repeat; everything is checked before anything runs.
+    """Return one spec per scenario (in each condition), arm and repeat; all is checked before anything runs.
 
     On a simulated rig the order does not matter. On a real one the battery empties and the floor
     wears, so each repeat is a block in which the order is drawn, by `conditions.seed`.
     """
-    scenarios = [load_scenario(name, conditions.overrides) for name in deck.scenarios]
+    scenarios = [deck.scenario_of(cell, conditions.overrides) for cell in deck.cells()]
     for scenario in scenarios:
         check_fit(scenario)
     _refuse_one_name_twice(deck, [scenario.name for scenario in scenarios])
@@ -111,7 +110,8 @@ def _refuse_one_name_twice(deck: Deck, names: Sequence[str]) -> None:
     Names that differ in case only share it too, on some file systems.
     """
     seen: dict[str, str] = {}
-    for file, name in zip(deck.scenarios, names, strict=True):
+    for cell, name in zip(deck.cells(), names, strict=True):
+        file = cell.scenario
         if name.casefold() in seen:
             raise BadInput(
                 f"deck: scenarios {seen[name.casefold()]!r} and {file!r} are both named {name!r}; "

@@ -22,6 +22,7 @@ from hil.config.sources import built_in_settings
 from hil.core.errors import BadInput
 from hil.core.files import replace_file
 from hil.study.campaign.plan import CampaignFile
+from hil.study.falsify.box import BoxFile
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +54,7 @@ KINDS = (
         "Scenario or lab of skid-steer-hil",
         Scenario,
         ("scenarios", "labs"),
-        ("RobotConfig", "CameraConfig"),
+        ("RobotConfig", "CameraConfig", "WaypointReference", "StopsReference"),
     ),
     FileKind("robot", "Robot of skid-steer-hil", RobotConfig, ("robots",)),
     FileKind("camera", "Camera of skid-steer-hil", CameraConfig),
@@ -66,6 +67,7 @@ KINDS = (
         dotted=("grid", "random"),
     ),
     FileKind("deck", "Deck of skid-steer-hil", Deck, ("decks",)),
+    FileKind("box", "Box of hil falsify", BoxFile, ("boxes",)),
 )
 
 
@@ -89,7 +91,7 @@ def all_settings() -> Iterator[Setting]:
     Defaults of a scenario are the values of scenario-1.
     """
     yield from built_in_settings()
-    for name, model in (("campaign", CampaignFile), ("deck", Deck)):
+    for name, model in (("campaign", CampaignFile), ("deck", Deck), ("box", BoxFile)):
         for setting in settings(model):
             yield replace(setting, key=f"{name}.{setting.key}")
 

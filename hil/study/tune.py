@@ -158,7 +158,12 @@ class Found:
 
 
 def run_cost(figures: Figures) -> float:
-    """Return the cost of one run; COST_FAILED at most, also where a figure is missing or NaN."""
+    """Return the cost of one run; COST_FAILED at most, also where a figure is missing or NaN.
+
+    A run of a deck with conditions brings its own, normalised by its task.
+    """
+    if "cost" in figures:
+        return min(figures["cost"], COST_FAILED)
     cost = sum(weight * figures.get(name, math.nan) for name, weight in COST_WEIGHTS.items())
     return min(cost, COST_FAILED) if math.isfinite(cost) else COST_FAILED
 

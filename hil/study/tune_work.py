@@ -12,18 +12,19 @@ import json
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import IO, Any, Self
 
 from hil.config.control import ControlConfig, PointReference
-from hil.config.deck import load_deck
+from hil.config.deck import CALM, Cell, Deck, load_deck
 from hil.config.gains import Gains, only_gains_of
 from hil.config.load import build, builtin_names, load_robot, load_scenario
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
 from hil.core.files import read_toml
 from hil.core.registries import OUTER_LAWS, source_digests
+from hil.study.suite import refuse_seen, spread_over
 from hil.study.tune import (
     CASES,
     COST_WEIGHTS,
@@ -39,6 +40,8 @@ from hil.study.tuning_verdict import ALL_SCENARIOS, HELD_OUT_SCENARIOS, JUDGED
 
 _FORMAT = "hil-tune-1"
 _KEPT = frozenset((*COST_WEIGHTS, *JUDGED))
+# Cells of a deck that each candidate runs, spread over its tasks and conditions.
+SEARCHED_CELLS = 8
 _VARIANTS: tuple[Variant, ...] = ("calm", "pushed", "late", "beside")
 
 
@@ -49,11 +52,24 @@ class Tasks:
     scenarios: Mapping[str, Scenario]
     own: bool
     robot: str | None
+    unseen: Mapping[str, Scenario] = field(default_factory=dict)
+    calm: Mapping[str, Scenario] = field(default_factory=dict)
+    conditions: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
         """Return the scenarios' names."""
         return tuple(self.scenarios)
+
+    @property
+    def judged(self) -> tuple[str, ...]:
+        """Return the names of what the result is judged on: unseen tasks, where a deck has them."""
+        return tuple(self.unseen) or self.names
+
+    @property
+    def known(self) -> dict[str, Scenario]:
+        """Return every scenario that is run: searched, judged, or that costs are normalised by."""
+        return {**self.scenarios, **self.unseen, **self.calm}
 
     @property
     def base(self) -> Gains:
@@ -84,6 +100,10 @@ class Tasks:
         if self.names == HELD_OUT_SCENARIOS:
             return CASES
         found = []
+        if self.conditions:  # the deck says in which conditions a task is run
+            return tuple(
+                Case(name, "calm", ("asg-ism", "pid")[i % 2]) for i, name in enumerate(self.names)
+            )
         for i, (name, task) in enumerate(self.scenarios.items()):
             point = isinstance(task.reference, PointReference)
             variants = _VARIANTS if point else _VARIANTS[:-1]
@@ -101,22 +121,45 @@ def load_tasks(names: Sequence[str], robot: str | None, overrides: Sequence[str]
     BadInput.
     """
     if len(names) == 1 and _is_deck(names[0]):
-        names = load_deck(names[0]).scenarios
+        deck = load_deck(names[0])
+        if deck.conditions:
+            return _of_deck(deck, names[0], robot, overrides)
+        names = deck.scenarios
     own = bool(names or robot or overrides)
     scenarios: dict[str, Scenario] = {}
     for name in names or HELD_OUT_SCENARIOS:
-        task = load_scenario(name, overrides)
-        if robot is not None:
-            tree = task.model_dump(mode="json")
-            task = build(
-                Scenario, tree | {"robot": load_robot(robot).model_dump(mode="json")}, name
-            )
+        task = _on_robot(load_scenario(name, overrides), robot)
         if task.name in scenarios or task.name == ALL_SCENARIOS:
             raise BadInput(
                 f"{name}: its name = {task.name!r} is taken; give each scenario a name of its own"
             )
         scenarios[task.name] = task
     return Tasks(scenarios, own, robot)
+
+
+def _on_robot(task: Scenario, robot: str | None) -> Scenario:
+    if robot is None:
+        return task
+    tree = task.model_dump(mode="json") | {"robot": load_robot(robot).model_dump(mode="json")}
+    return build(Scenario, tree, task.name)
+
+
+def _of_deck(deck: Deck, name: str, robot: str | None, overrides: Sequence[str]) -> Tasks:
+    """Return the tasks of a deck with conditions: what a search sees, and what judges it."""
+    if deck.search is None:
+        raise BadInput(
+            f"{name}: has conditions and no [search], so every task would be searched and judged alike; "
+            "say in [search] which scenarios and conditions a search may see"
+        )
+    seen = spread_over(deck.search_cells(), SEARCHED_CELLS)
+    refuse_seen(deck.unseen_cells(), deck.search_cells())
+
+    def loaded(cells: Sequence[Cell]) -> dict[str, Scenario]:
+        found = (_on_robot(deck.scenario_of(cell, overrides), robot) for cell in cells)
+        return {task.name: task for task in found}
+
+    calm = loaded([Cell(scenario=name, condition=CALM) for name in deck.scenarios])
+    return Tasks(loaded(seen), True, robot, loaded(deck.unseen_cells()), calm, conditions=True)
 
 
 def _is_deck(name: str) -> bool:

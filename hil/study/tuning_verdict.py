@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from hil.analysis.stats import Paired, paired
-from hil.study.tune import Case, Figures, Trial, run_cost
+from hil.core.errors import BadInput
+from hil.study.tune import Case, Figures, Plan, Trial, run_cost
 
 if TYPE_CHECKING:
     from hil.config.gains import Gains
@@ -91,9 +92,27 @@ def pairs_of(tuned: Sequence[str]) -> list[Pair]:
     return found
 
 
-def judge(trials: Sequence[Trial], figures: Sequence[Figures], pair: Pair = USUAL) -> Verdict:
-    """Return the verdict on the runs of a held-out tape; runs of other laws are left aside."""
+def _refuse_tuned_on(trials: Sequence[Trial], seeds_seen: Sequence[int]) -> None:
+    seen = sorted({trial.seed for trial in trials} & set(seeds_seen))
+    if seen:
+        raise BadInput(
+            f"held-out seeds {', '.join(map(str, seen))}: the search has run them; a verdict is spoken on "
+            f"runs that no candidate has seen, such as seeds from {HELD_OUT_SEED} up"
+        )
+
+
+def judge(
+    trials: Sequence[Trial],
+    figures: Sequence[Figures],
+    pair: Pair = USUAL,
+    seeds_seen: Sequence[int] = Plan().seeds,
+) -> Verdict:
+    """Return the verdict on the runs of a held-out tape; runs of other laws are left aside.
+
+    Raises BadInput where a run is one that the search has made (`seeds_seen`).
+    """
     law, other = pair
+    _refuse_tuned_on(trials, seeds_seen)
     own = [place for place, trial in enumerate(trials) if trial.outer in pair]
     trials, figures = [trials[place] for place in own], [figures[place] for place in own]
     values: dict[str, dict[str, dict[str, list[float]]]] = {

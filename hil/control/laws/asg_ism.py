@@ -74,6 +74,7 @@ def is_norm(cost: str) -> bool:
     "asg-ism",
     settings=AsgIsmGains,
     search=SEARCH,
+    sliding=True,
     summary="backstepping with an averaged sub-gradient integral sliding mode",
     colour="#d55e00",
 )

@@ -61,6 +61,7 @@ class AsgIsmImplicitGains(StageGains):
         "sigma_m_s2": (1e-3, 0.01, 1.0),
     }
     | START_BOX,
+    sliding=True,
     summary="ASG-ISM with an implicit (proximal) sliding term: no layer",
     colour="#882255",
     trace=TERM,

@@ -61,6 +61,7 @@ class IntegralSlidingModeGains(StageGains):
         "filter_s": (0.03, 0.3, 3.0),
     }
     | START_BOX,
+    sliding=True,
     summary="Utkin and Shi's integral sliding mode with a filter for the equivalent control",
     colour="#cc79a7",
     trace=TERM,

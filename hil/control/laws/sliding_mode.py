@@ -40,6 +40,7 @@ class SlidingModeGains(StageGains):
     "sliding-mode",
     settings=SlidingModeGains,
     search=STAGE_BOX | {"alpha_m_s3": (0.1, 3.0, 30.0), "eps_m_s2": (0.01, 1.0, 5.0)} | START_BOX,
+    sliding=True,
     summary="classical first-order sliding mode with a boundary layer",
     colour="#e69f00",
     trace=TERM,

@@ -51,6 +51,7 @@ class SuperTwistingGains(StageGains):
     "super-twisting",
     settings=SuperTwistingGains,
     search=STAGE_BOX | {"bound_m_s4": (0.1, 5.0, 300.0)} | START_BOX,
+    sliding=True,
     summary="super-twisting: a continuous sliding mode of second order, implicit step",
     colour="#56b4e9",
     trace=TERM,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import functools
 import hashlib
 import itertools
 import json
@@ -124,8 +125,31 @@ class Distribution(Section):
             continue  # drawn again: cut off at the bound, many rows would share one value
         return value
 
+    def quantile(self, share: float) -> float:
+        """Return the value below which `share` of the distribution lies, 0 to 1."""
+        if self.kind == "uniform":
+            return self.low + share * (self.high - self.low)
+        if self.kind == "loguniform":
+            return float(self.low * (self.high / self.low) ** share)
+        bell = NormalDist(self.mean, self.sd)
+        below, above = bell.cdf(self.low), bell.cdf(self.high)
+        inside = min(max(below + share * (above - below), 1e-12), 1.0 - 1e-12)
+        return min(max(bell.inv_cdf(inside), self.low), self.high)
+
 
 Axis = Annotated[Range | list[Any], Field(union_mode="left_to_right")]
+
+
+@functools.lru_cache(maxsize=4)
+def _spread(kind: str, axes: int, draws: int, seed: int) -> list[list[float]]:
+    """Return `draws` points of the unit cube that fill it evenly, the same each time."""
+    from scipy.stats import qmc  # noqa: PLC0415 - slow import, rarely needed
+
+    if kind == "latin":
+        points = qmc.LatinHypercube(axes, rng=seed).random(draws)
+    else:  # Sobol's sequence is balanced at powers of two: the first of the next one
+        points = qmc.Sobol(axes, rng=seed).random_base2(max(draws - 1, 1).bit_length())[:draws]
+    return [[float(x) for x in point] for point in points]
 
 
 class CampaignFile(Section):
@@ -143,6 +167,10 @@ class CampaignFile(Section):
     seed: int = Field(1, ge=0, description="first seed")
     seeds: int = Field(1, ge=1, le=100_000, description="seeds a point")
     draws: int = Field(1, ge=1, le=1_000_000, description="draws of `random` a point")
+    sampling: Literal["random", "sobol", "latin"] = Field(
+        "random",
+        description="how `random` is drawn: independently, or spread evenly (scipy.stats.qmc)",
+    )
     grid: dict[str, Axis] = Field(default_factory=dict, description="every combination")
     together: tuple[dict[str, list[Any]], ...] = Field(
         (), description="lists of equal length, taken in step"
@@ -251,6 +279,14 @@ class Campaign:
 
     def drawn(self, draw: int) -> Point:
         """Return draw number `draw`, the same at every point of the grid."""
+        if self.file.sampling != "random":
+            shares = _spread(
+                self.file.sampling, len(self.file.random), self.file.draws, self.file.seed
+            )
+            return {
+                name: distribution.quantile(shares[draw][place])
+                for place, (name, distribution) in enumerate(self.file.random.items())
+            }
         return {
             name: distribution.draw(Random(f"{self.file.seed} {name} {draw}"))
             for name, distribution in self.file.random.items()

@@ -1,0 +1,1 @@
+"""Searching for the run that most violates a requirement (docs/verdict.md)."""

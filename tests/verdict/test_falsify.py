@@ -1,0 +1,215 @@
+"""The search for a counterexample: margin, box, reduction, and what is kept."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from hil.analysis.metrics import Verdict
+from hil.cli.falsify import command
+from hil.config.deck import load_deck
+from hil.config.load import load_scenario
+from hil.core.errors import BadInput
+from hil.runs.execute import RunSpec, execute_in_memory
+from hil.study.falsify.box import load_box
+from hil.study.falsify.keep import add_to_deck, write_scenario
+from hil.study.falsify.margin import FURTHEST, OneRun, Outcome, margin_of
+from hil.study.falsify.search import Trial, falsify
+
+BOX = """
+[range]
+"mismatch.mass_kg" = { low = 0.8, high = 2.0 }
+"start.x_m" = { low = -0.1, high = 0.1, offset = true }
+"link.latency_s" = { low = 0.0, high = 0.2 }
+[[disturbance]]
+target = "slope_x_rad"
+shape = "step"
+least = -0.1
+largest = 0.1
+"""
+
+
+def box_of(tmp_path, scenario="ahead", text=BOX):
+    file = tmp_path / "box.toml"
+    file.write_text(text)
+    return load_box(str(file), load_scenario(scenario))
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "margin"),
+    [
+        (0.01, None, 0.02, 0.5),
+        (0.03, None, 0.02, -0.5),
+        (0.02, None, 0.02, 0.0),
+        (-0.5, -1.0, None, 0.5),
+        (0.5, None, 0.0, -0.5),
+        (float("nan"), None, 1.0, -1.0),
+        (1e9, None, 1.0, -FURTHEST),
+    ],
+)
+def test_margin_is_negative_exactly_where_the_requirement_fails(value, low, high, margin):
+    """By hand; relative to the bound, over 1 for a bound of zero."""
+    holds = (low is None or value >= low) and (high is None or value <= high)
+    found, _ = margin_of([Verdict("x", value, "m", low, high, holds)])
+    assert found == pytest.approx(margin)
+    assert (found >= 0) == holds
+
+
+def test_the_worst_requirement_decides():
+    """And is named."""
+    verdicts = [Verdict("a", 1.0, "m", None, 2.0, True), Verdict("b", 3.0, "s", None, 2.0, False)]
+    assert margin_of(verdicts) == (-0.5, "b <= 2 s")
+
+
+def test_box_holds_the_scenario_itself(tmp_path):
+    """Its point departs in nothing; offsets count from the scenario; a disturbance of 0 is none."""
+    box = box_of(tmp_path)
+    assert box.departures(box.usual) == {}
+    assert box.at(box.usual) == load_scenario("ahead")
+    axis = next(axis for axis in box.axes if axis.key == "start.x_m")
+    assert (axis.low, axis.high) == pytest.approx((-0.65, -0.45))
+    moved = box.at((*box.usual[:-1], 1.0))
+    assert [(d.target, d.amplitude) for d in moved.disturbances] == [("slope_x_rad", 0.1)]
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "nothing to search"),
+        ('[range]\n"robot.mas_kg" = {low=1, high=2}\n', "has no such number"),
+        ('[range]\n"robot.mass_kg" = {low=2, high=1}\n', "must be below high"),
+    ],
+)
+def test_a_box_that_is_none_is_told(tmp_path, text, told):
+    """In one line, with what to do."""
+    with pytest.raises(BadInput, match=told):
+        box_of(tmp_path, text=text)
+
+
+def test_default_box_fits_every_task_of_the_suite():
+    """Keys that a task does not have are left out; its corners are scenarios."""
+    for name in load_deck("suite").scenarios:
+        box = load_box("default", load_scenario(name))
+        assert len(box.axes) > 15
+        for share in (0.0, 1.0):
+            box.at([share] * len(box.axes))
+
+
+def bowl(box, fails):
+    """Return what runs points: the margin of `fails` applied to the values by key."""
+
+    def run(points):
+        found = []
+        for point in points:
+            values = {
+                axis.key: axis.value(share) for axis, share in zip(box.axes, point, strict=True)
+            }
+            found.append(Trial(tuple(point), Outcome(fails(values), "x <= 1")))
+        return found
+
+    return run
+
+
+def test_counterexample_is_reduced_to_the_one_departure_that_matters(tmp_path):
+    """Fails from a mass of 1.5 on, whatever the rest: one departure is left, just beyond 1.5."""
+    box = box_of(tmp_path)
+    found = falsify(box, bowl(box, lambda v: 1.5 - v["mismatch.mass_kg"]), runs=101, seed=1)
+    ((key, value),) = box.departures(found.reduced.point).items()
+    assert key == "mismatch.mass_kg"
+    assert 1.5 < value < 1.52
+    assert found.worst.outcome.margin <= found.reduced.outcome.margin < 0
+
+
+def test_two_that_only_fail_together_both_stay(tmp_path):
+    """A delay and a slope: neither alone violates anything, so the reduction keeps both."""
+    box = box_of(tmp_path)
+
+    def fails(v):
+        return 0.15 - min(v["link.latency_s"], 2 * abs(v["disturbance.slope_x_rad"]))
+
+    found = falsify(box, bowl(box, fails), runs=301, seed=1)
+    assert set(box.departures(found.reduced.point)) == {"link.latency_s", "disturbance.slope_x_rad"}
+
+
+def test_nothing_is_found_where_nothing_fails(tmp_path):
+    """And refused runs are not taken for failures."""
+    box = box_of(tmp_path)
+    assert (
+        falsify(box, bowl(box, lambda v: 0.1 + v["link.latency_s"]), runs=51, seed=1).reduced
+        is None
+    )
+
+    def refused(points):
+        return [Trial(tuple(p), Outcome(-1.0, "lost", refused=i > 0)) if i else
+                Trial(tuple(p), Outcome(1.0, "")) for i, p in enumerate(points)]  # fmt: skip
+
+    found = falsify(box, refused, runs=51, seed=1)
+    assert found.reduced is None
+    assert found.refused > 0
+
+
+def test_against_another_law_both_margins_count():
+    """What the other law fails as well is no counterexample against it."""
+    ours = Outcome(-0.5, "x")
+    assert Trial((), ours, Outcome(0.2, "")).counts
+    assert not Trial((), ours, Outcome(-0.1, "")).counts
+    assert Trial((), ours, Outcome(0.2, "")).objective == pytest.approx(-0.7)
+
+
+def test_what_is_kept_replays_the_run(tmp_path):
+    """The written scenario gives the margin of the search, to the last digit, and the deck holds it."""
+    task = load_scenario("ahead", ["duration_s=4"])
+    box = load_box(str(box_file(tmp_path)), task)
+    point = list(box.usual)
+    point[0], point[-1] = 1.0, 0.9
+    run = OneRun()
+    outcome = run((box.at(point), "pid", 5))
+    keep = tmp_path / "kept"
+    keep.mkdir()
+    file = write_scenario(
+        keep, "ahead", ["duration_s=4"], box, Trial(tuple(point), outcome), "pid", 5, None
+    )
+    scenario = load_scenario(str(file))
+    assert scenario.control.outer == "pid"
+    spec = RunSpec(scenario, "twin", scenario.camera_source, "pid", "asg-ism", 5, tmp_path)
+    replayed, _ = margin_of(execute_in_memory(spec).verdicts())
+    assert replayed == outcome.margin
+    deck = load_deck(str(add_to_deck(keep, file, "pid", 5)))
+    assert add_to_deck(keep, file, "pid", 5).read_text().count(file.name) == 1
+    assert deck.laws == ("pid",)
+    (cell,) = deck.cells()
+    assert deck.scenario_of(cell).name == scenario.name
+
+
+def box_file(tmp_path):
+    file = tmp_path / "box.toml"
+    file.write_text(BOX)
+    return file
+
+
+def test_falsify_from_the_command_line(tmp_path):
+    """A requirement that no law can meet is violated as it stands: kept without a departure, exit 1."""
+    task = tmp_path / "hopeless.toml"
+    task.write_text(
+        'base = "ahead"\nname = "hopeless"\nduration_s = 1.5\n'
+        '[[requirements]]\nmetric = "delta1_worst_last_second_m"\nmax = 0.02\n'
+    )
+    asked = [str(task), "--outer", "pid", "--runs", "11", "--workers", "1",
+             "--keep", str(tmp_path / "kept"), "--json"]  # fmt: skip
+    run = CliRunner().invoke(command, asked, standalone_mode=False, catch_exceptions=False)
+    document = json.loads(run.stdout)
+    assert run.return_value == 1
+    assert document["found"]
+    assert document["counterexample"]["departures"] == {}
+    assert document["counterexample"]["margin"] < -1
+    assert load_scenario(document["file"]).duration_s == 1.5
+
+
+def test_falsify_refuses_what_it_cannot_search():
+    """A law against itself, and a scenario that asks nothing."""
+    for asked, told in (
+        (["ahead", "--outer", "pid", "--against", "pid"], "is the law itself"),
+        (["ahead", "--set", "requirements=[]"], "has no \\[\\[requirements\\]\\]"),
+    ):
+        with pytest.raises(BadInput, match=told):
+            CliRunner().invoke(command, asked, standalone_mode=False, catch_exceptions=False)
