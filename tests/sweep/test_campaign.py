@@ -14,7 +14,8 @@ from pydantic import ValidationError
 
 from hil.config.load import builtin_names
 from hil.core.errors import BadInput
-from hil.study.campaign.plan import Campaign, Distribution, Range, load_campaign
+from hil.study.campaign.axes import Distribution, Range
+from hil.study.campaign.plan import Campaign, load_campaign
 
 
 def campaign(folder: Path, text: str) -> Campaign:
