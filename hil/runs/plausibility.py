@@ -28,10 +28,11 @@ Note = Callable[[str, str], None]
 SIDES = ("left", "right")
 DIAGNOSIS = "diagnosis"  # kind of the record's events that the verdict repeats
 
-# A side is asked to move from here on, and is stuck below this share of it for so long; the board's
-# own limit for a wheel without any count is 0.5 s, so that one speaks first.
+# A side is asked to move from here on, and is stuck below this share of it over so long; the board's
+# own limit for a wheel without any count is 0.5 s, so that one speaks first. A robot that wriggles about
+# its stuck wheel turns that to and fro, by less than the last share.
 _ASKED_RAD_S = 2.0
-_STUCK_RATIO, _STUCK_PWM_RATIO, _STUCK_S = 0.03, 0.5, 0.6
+_STUCK_RATIO, _STUCK_PWM_RATIO, _STUCK_S, _WRIGGLE_RATIO = 0.03, 0.5, 0.6, 0.1
 # What has turned at least so much of what was asked, at full PWM, is weak and not stuck.
 _TURNS_RATIO = 0.1
 # A wheel that turns as asked (above the first share) cannot stand (below the second) and turn again
@@ -68,6 +69,8 @@ class _Side:
     """What is known of one side."""
 
     stuck: Held = field(default_factory=Held)
+    stuck_asked_rad: float = 0.0
+    stuck_given_rad: float = 0.0
     full: Held = field(default_factory=Held)
     dip: Held = field(default_factory=Held)
     turned: bool = False
@@ -177,10 +180,15 @@ class Plausibility:
         pwm_ratio: float,
     ) -> None:  # fmt: skip
         moving = abs(asked) >= _ASKED_RAD_S
-        low = moving and abs(given) < _STUCK_RATIO * abs(asked)
+        low = moving and abs(given) < _WRIGGLE_RATIO * abs(asked)
         stuck_s = side.stuck.after(now_s, low and pwm_ratio >= _STUCK_PWM_RATIO)
+        if stuck_s <= 0.0:
+            side.stuck_asked_rad = side.stuck_given_rad = 0.0
+        side.stuck_asked_rad += asked * dt_s
+        side.stuck_given_rad += given * dt_s
+        stands = abs(side.stuck_given_rad) < _STUCK_RATIO * abs(side.stuck_asked_rad)
         weak = side.weak_s > _WEAK_S and side.given_rad > _TURNS_RATIO * side.asked_rad
-        if stuck_s >= _STUCK_S and not weak:
+        if stuck_s >= _STUCK_S and stands and not weak:
             self._react(
                 "motor_stuck",
                 f"motor stuck: {SIDES[index]} wheels turn {given:.2f} rad/s of {asked:.2f} rad/s asked at "

@@ -200,7 +200,7 @@ def test_class_of_a_script_is_a_law_that_is_watched() -> None:
         (lambda: hil.run("scenario-1", "pidd"), "near: pid"),
         (lambda: hil.run("scenario-1", int), "decorate it: @hil.outer_law"),
         (lambda: hil.run("scenario-1", seed=-1), "seed = -1: must be from 0"),
-        (lambda: hil.run("scenario-1", inner="lqr"), "no such wheel law"),
+        (lambda: hil.run("scenario-1", inner="lqr"), "the board has none of this name"),
         (lambda: hil.run("scenario-1", on="moon"), "target 'moon': unknown"),
         (lambda: hil.run("scenario-1", robot__mas_kg=3), "near: robot.mass_kg"),
         (lambda: hil.run("scenario-1", robot__mass_kg=-1), "greater than"),

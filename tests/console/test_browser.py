@@ -65,7 +65,7 @@ def open_page(chromium):
             ),
         )
         page.goto(console.address)
-        expect(page.locator("#law option")).to_have_count(3)
+        expect(page.locator('#law option[value="asg-ism"]')).to_have_count(1)
         return page
 
     yield opened

@@ -47,8 +47,9 @@ def test_other_wheel_law_is_a_shadow(made: Path) -> None:
     report = replay_wheels(made, "pid")
     assert report.shadow
     assert "shadow" in report.text()
-    assert report.phase_us == 0
-    assert report.left.rms_difference > replay_wheels(made).left.rms_difference
+    same = replay_wheels(made)
+    assert report.phase_us == same.phase_us  # where the encoder was read is a fact of the record
+    assert report.left.rms_difference > same.left.rms_difference
 
 
 def test_too_short_a_log_is_refused(tmp_path: Path) -> None:
