@@ -125,11 +125,11 @@ class HandOver:
         rows = array("d")
         while self._rows:
             rows.extend(self._rows.popleft())
-        if rows:
-            self._write(ROWS, rows.tobytes())
         sigma, self._sigma = self._sigma, None
         if sigma is not None and rows:
-            self.say(sigma=sigma)
+            self.say(sigma=sigma)  # before the rows it goes with: a short run has no later ones
+        if rows:
+            self._write(ROWS, rows.tobytes())
         events = []
         while self._events:
             events.append(self._events.popleft())

@@ -14,7 +14,7 @@ import pytest
 import hil
 from tests.console.rig import CHROMIUM, NO_CHROMIUM, PATIENCE_S, Console, browser, served_twin
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
+pytestmark = [pytest.mark.realtime, pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)]
 CHESSBOARD = Path(__file__).parents[1] / "data" / "chessboard"
 # A machine that is busy elsewhere is late by more than a rig may be.
 PATIENT = {"safety.pose_lost_s": 9, "safety.link_lost_s": 9}

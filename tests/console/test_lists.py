@@ -16,6 +16,8 @@ from hil.console.orders import inside, order_of
 from hil.core.errors import BadInput
 from tests.console.rig import PATIENCE_S, Console
 
+pytestmark = pytest.mark.realtime
+
 CAMPAIGN = """
 name = "small"
 scenario = "scenario-1"

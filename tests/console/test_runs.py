@@ -13,6 +13,8 @@ import hil
 from hil.console.people import Page, People
 from tests.console.rig import PATIENCE_S, Console, is_gone, served_twin
 
+pytestmark = pytest.mark.realtime
+
 ORDER = {"scenario": "scenario-1", "camera": "pose", "seed": 3, "real_time": False,
          "overrides": ["duration_s=2"]}  # fmt: skip
 

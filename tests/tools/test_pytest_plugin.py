@@ -190,7 +190,10 @@ def test_a_fault_of_the_rig_fails_with_its_cause(results: Results) -> None:
         ("test_unknown_scenario", "scenario-9"),
         ("test_unknown_key", "robot.mas_kg"),
         ("test_unknown_argument", "unexpected keyword argument 'kamera'"),
-        ("test_unknown_wheel_law", "inner law 'lqr': the board has none of this name; choose asg-ism or pid"),
+        (
+            "test_unknown_wheel_law",
+            "inner law 'lqr': the board has none of this name; choose asg-ism or pid",
+        ),
         ("test_no_such_file", "none.py cannot be read"),
         ("test_no_marker", "hil_run: the test has no marker pytest.mark.hil(scenario)"),
     ],
