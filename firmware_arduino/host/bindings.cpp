@@ -65,8 +65,7 @@ hil::Params params_of(const Values& values) {
   hil::Params params;
   hil::params_defaults(params);
   for (const auto& [name, value] : values) {
-    const hil::ParamResult result =
-        hil::param_set(params, hil::param_find(name.c_str()), value, false);
+    const hil::ParamResult result = hil::param_set(params, hil::param_find(name.c_str()), value, false);
     if (result == hil::ParamResult::UNKNOWN) throw nb::key_error(("unknown parameter " + name).c_str());
     if (result != hil::ParamResult::SET) throw nb::value_error((name + " is out of its range").c_str());
   }
@@ -88,8 +87,8 @@ std::uint8_t const* data_of(const nb::bytes& bytes) {
 // The differentiator on any signal, with a step that may vary: cameras drop frames.
 class SuperTwisting {
  public:
-  SuperTwisting(float l, float l0, float l1, hil::Scheme scheme, float cell,
-                std::optional<float> l_min, float rho_1_s, float alpha)
+  SuperTwisting(float l, float l0, float l1, hil::Scheme scheme, float cell, std::optional<float> l_min,
+                float rho_1_s, float alpha)
       : l_(l), l0_(l0), l1_(l1), cell_(cell), scheme_(scheme), l_min_(l_min), rho_1_s_(rho_1_s),
         alpha_(alpha) {
     if (!(l > 0.0f && l0 > 0.0f && l1 > 0.0f && cell >= 0.0f)) {
@@ -239,8 +238,8 @@ void bind_differentiator(nb::module_& m) {
       .value("SEMI_IMPLICIT", hil::Scheme::SEMI_IMPLICIT)
       .value("IMPLICIT", hil::Scheme::IMPLICIT);
   nb::class_<SuperTwisting>(m, "SuperTwisting")
-      .def(nb::init<float, float, float, hil::Scheme, float, std::optional<float>, float, float>(),
-           "l"_a, "l0"_a = 1.1f, "l1"_a = 1.5f, "scheme"_a = hil::Scheme::SEMI_IMPLICIT, "cell"_a = 0.0f,
+      .def(nb::init<float, float, float, hil::Scheme, float, std::optional<float>, float, float>(), "l"_a,
+           "l0"_a = 1.1f, "l1"_a = 1.5f, "scheme"_a = hil::Scheme::SEMI_IMPLICIT, "cell"_a = 0.0f,
            "l_min"_a = nb::none(), "rho_1_s"_a = 30.0f, "alpha"_a = 0.6f)
       .def("step", &SuperTwisting::step, "x"_a, "dt_s"_a)
       .def_prop_ro("l", &SuperTwisting::l);
@@ -248,9 +247,10 @@ void bind_differentiator(nb::module_& m) {
 
 void bind_encoder(nb::module_& m) {
   nb::class_<hil::Quadrature>(m, "Quadrature")
-      .def("__init__",
-           [](hil::Quadrature* q, uint8_t ab) { new (q) hil::Quadrature{ab, 0, 0}; }, "ab"_a = 0)
-      .def("update", [](hil::Quadrature& q, uint8_t ab) { hil::quadrature_update(q, ab); }, "ab"_a)
+      .def(
+          "__init__", [](hil::Quadrature* q, uint8_t ab) { new (q) hil::Quadrature{ab, 0, 0}; }, "ab"_a = 0)
+      .def(
+          "update", [](hil::Quadrature& q, uint8_t ab) { hil::quadrature_update(q, ab); }, "ab"_a)
       .def_ro("counts", &hil::Quadrature::counts)
       .def_ro("illegal", &hil::Quadrature::illegal);
 }
@@ -293,8 +293,8 @@ void bind_board(nb::module_& m) {
   nb::class_<Board>(m, "Board")
       .def(nb::init<const nb::bytes&>(), "eeprom"_a = nb::bytes("", 0))
       .def("receive", &Board::receive, "data"_a, "t_us"_a)
-      .def("tick", &Board::tick, "t_us"_a, "counts_left"_a, "counts_right"_a,
-           "encoder_faults"_a = 0, "battery_mv"_a = 12000)
+      .def("tick", &Board::tick, "t_us"_a, "counts_left"_a, "counts_right"_a, "encoder_faults"_a = 0,
+           "battery_mv"_a = 12000)
       .def("transmit", &Board::transmit, "limit"_a = 256)
       .def_prop_ro("loaded", &Board::loaded)
       .def_prop_ro("eeprom", &Board::eeprom)
@@ -326,8 +326,9 @@ void bind_facts(nb::module_& m) {
       .def_ro("doc", &WheelLawName::doc)
       .def_ro("value", &WheelLawName::value);
   m.def("wheel_laws", &wheel_laws);
-  m.def("parameter_hash", [](const Values& values) { return hil::params_hash(params_of(values)); },
-        "parameters"_a = Values{});
+  m.def(
+      "parameter_hash", [](const Values& values) { return hil::params_hash(params_of(values)); },
+      "parameters"_a = Values{});
   m.def("dialect_hash", &hil::dialect_hash);
   m.def("safety_next", &hil::safety_next, "state"_a, "conditions"_a);
   m.def("safety_reason", &hil::safety_reason, "conditions"_a);

@@ -85,20 +85,14 @@ Bytes mutated(Bytes frame, Random& rng, const Bytes& replay) {
     case 0:
       for (auto& byte : frame) byte = static_cast<uint8_t>(rng.next());
       break;
-    case 1:
-      frame.resize(place);
-      break;
-    case 2:
-      frame[place] ^= static_cast<uint8_t>(1u << rng.below(8));
-      break;
+    case 1: frame.resize(place); break;
+    case 2: frame[place] ^= static_cast<uint8_t>(1u << rng.below(8)); break;
     case 3:
       frame[1] = static_cast<uint8_t>(rng.next());
       frame.resize(280, 0xA5);
       break;
-    case 4:
-      return replay;
-    default:
-      break;
+    case 4: return replay;
+    default: break;
   }
   return frame;
 }
@@ -110,8 +104,8 @@ class Rig {
   void feed(const Bytes& bytes) {
     const auto size = static_cast<uint16_t>(bytes.size());
     for (uint16_t at = 0; at < size;) {
-      at = static_cast<uint16_t>(at + hil::board_receive(board, bytes.data() + at,
-                                                         static_cast<uint16_t>(size - at), t_us));
+      at = static_cast<uint16_t>(
+          at + hil::board_receive(board, bytes.data() + at, static_cast<uint16_t>(size - at), t_us));
     }
   }
 

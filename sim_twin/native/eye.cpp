@@ -73,8 +73,8 @@ std::optional<PoseSample> DrawnPoses::measure(const PoseSample& pose) {
   const double turn_rad = outlier ? o.outlier_theta_rad : o.sigma_theta_rad;
   PoseSample seen = pose;
   if (o.swapped) {
-    seen = {pose.x_m + o.shift_m * std::cos(pose.theta_rad),
-            pose.y_m + o.shift_m * std::sin(pose.theta_rad), pose.theta_rad + kPi};
+    seen = {pose.x_m + o.shift_m * std::cos(pose.theta_rad), pose.y_m + o.shift_m * std::sin(pose.theta_rad),
+            pose.theta_rad + kPi};
   }
   const double stands = std::sqrt(o.place_ratio), fresh = std::sqrt(1.0 - o.place_ratio);
   double off[3];

@@ -27,8 +27,7 @@ struct ShutterOptions {
 
 class Shutter {
  public:
-  Shutter(const ShutterOptions& options, const Chance& chance)
-      : options_(options), chance_(chance) {}
+  Shutter(const ShutterOptions& options, const Chance& chance) : options_(options), chance_(chance) {}
   // The next frame that will arrive; nothing when the camera has stalled for good. `stalls` by start.
   std::optional<Exposure> next(const std::vector<Span>& stalls);
 

@@ -15,8 +15,7 @@ constexpr double kRunaway_rad_s = 1e4;
 
 }  // namespace
 
-Encoder::Encoder(int counts_per_turn)
-    : counts_per_rad_(counts_per_turn / (2.0 * 3.14159265358979323846)) {}
+Encoder::Encoder(int counts_per_turn) : counts_per_rad_(counts_per_turn / (2.0 * 3.14159265358979323846)) {}
 
 void Encoder::reset(double angle_rad) {
   angle_rad_ = angle_rad;
@@ -35,8 +34,8 @@ std::uint8_t Encoder::level(const FaultState::Side& fault) const {
   return ab;
 }
 
-void Encoder::move(double angle_rad, double t0_us, double h_us, const FaultState::Side& fault,
-                   int side, std::vector<PinEdge>& edges) {
+void Encoder::move(double angle_rad, double t0_us, double h_us, const FaultState::Side& fault, int side,
+                   std::vector<PinEdge>& edges) {
   const double begin = position(angle_rad_), end = position(angle_rad);
   const auto last = static_cast<std::int64_t>(std::floor(end));
   const double us_per_count = end != begin ? h_us / (end - begin) : 0.0;
@@ -52,11 +51,8 @@ void Encoder::move(double angle_rad, double t0_us, double h_us, const FaultState
   } while (count_ != last);
 }
 
-Kernel::Kernel(const PlantParams& params, const KernelOptions& options,
-               std::shared_ptr<BoardSide> board)
-    : plant_(params),
-      options_(options),
-      board_(std::move(board)),
+Kernel::Kernel(const PlantParams& params, const KernelOptions& options, std::shared_ptr<BoardSide> board)
+    : plant_(params), options_(options), board_(std::move(board)),
       encoders_{Encoder(options.counts_per_turn), Encoder(options.counts_per_turn)} {
   if (options.step_us <= 0 || kPoseSpacing_us % options.step_us != 0) {
     throw std::invalid_argument("step_us must divide 1000 us");
@@ -108,8 +104,8 @@ void Kernel::follow_reset_line() {
 void Kernel::set_drive() {
   for (int side = 0; side < 2; ++side) {
     const int channel = fault_.motors_exchanged ? 1 - side : side;
-    drive_.duty[side] = board_->duty(channel) * (fault_.side[side].reversed ? -1.0 : 1.0) *
-                        fault_.side[side].strength;
+    drive_.duty[side] =
+        board_->duty(channel) * (fault_.side[side].reversed ? -1.0 : 1.0) * fault_.side[side].strength;
     drive_.jam[side] = fault_.side[side].stuck ? kJam_n_m_s_rad : 0.0;
   }
 }
@@ -142,8 +138,7 @@ void Kernel::follow_outside(double h_s) {
   const double share = done_us / static_cast<double>(outside_period_us_);
   StateVector& x = plant_.changed_state();
   for (int i = 0; i < kStates; ++i) {
-    x[i] = share < 1.0 ? outside_from_[i] + share * (outside_to_[i] - outside_from_[i])
-                       : outside_to_[i];
+    x[i] = share < 1.0 ? outside_from_[i] + share * (outside_to_[i] - outside_from_[i]) : outside_to_[i];
   }
   x[kCharge] = charge;
 }
@@ -163,8 +158,8 @@ void Kernel::integrate() {
   // Zones are looked up at the pose where the step begins: 0.1 mm at most.
   const double x_m = plant_.state()[kX], y_m = plant_.state()[kY];
   const LoadVector end = disturbances_.loads(t_s + h_s, x_m, y_m);
-  plant_.step(h_s, drive_, disturbances_.loads(t_s, x_m, y_m),
-              disturbances_.loads(t_s + 0.5 * h_s, x_m, y_m), end);
+  plant_.step(h_s, drive_, disturbances_.loads(t_s, x_m, y_m), disturbances_.loads(t_s + 0.5 * h_s, x_m, y_m),
+              end);
   sag_v_ = end[kBatterySag];
 }
 
@@ -192,7 +187,8 @@ void Kernel::step() {
     // The encoder sits on the motor, which turns on where the gear slips.
     const double moved_rad = x[kWheelL + side] - wheel_rad[side];
     slipped_rad_[side] += moved_rad * (1.0 / fault_.side[side].grip - 1.0);
-    encoders_[side].move(x[kWheelL + side] + slipped_rad_[side], t0_us, h_us, fault_.side[side], port, edges_);
+    encoders_[side].move(x[kWheelL + side] + slipped_rad_[side], t0_us, h_us, fault_.side[side], port,
+                         edges_);
   }
   if (edges_.size() > 1) {
     std::stable_sort(edges_.begin(), edges_.end(),

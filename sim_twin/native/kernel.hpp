@@ -40,8 +40,8 @@ class Encoder {
 // A robot whose motion somebody else works out: given the time, the motors' voltages, what else acts
 // on it, and the damping of a jammed gear, it returns the state one period later (its charge is not
 // looked at).
-using OutsidePlant = std::function<StateVector(std::int64_t t_us, const Pair& volts,
-                                               const LoadVector& loads, const Pair& jam)>;
+using OutsidePlant = std::function<StateVector(std::int64_t t_us, const Pair& volts, const LoadVector& loads,
+                                               const Pair& jam)>;
 
 struct PoseSample {
   double x_m = 0.0, y_m = 0.0, theta_rad = 0.0;
@@ -54,8 +54,7 @@ struct KernelOptions {
 
 class Kernel {
  public:
-  Kernel(const PlantParams& params, const KernelOptions& options,
-         std::shared_ptr<BoardSide> board);
+  Kernel(const PlantParams& params, const KernelOptions& options, std::shared_ptr<BoardSide> board);
 
   // Robot at rest at the pose, board powered up, time zero.
   void reset(double x_m, double y_m, double theta_rad);

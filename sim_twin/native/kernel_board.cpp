@@ -84,8 +84,7 @@ void HostBoard::transmit(double t_us) {
   const std::uint16_t n = hil::board_transmit(board_, buffer, limit);
   if (n == 0) return;
   uart_free_us_ = t_us + ahead_us + n * options_.byte_us;
-  sent.push_back({std::llround(uart_free_us_),
-                  std::string(reinterpret_cast<const char*>(buffer), n)});
+  sent.push_back({std::llround(uart_free_us_), std::string(reinterpret_cast<const char*>(buffer), n)});
 }
 
 void HostBoard::tick(double t_us, double battery_v) {

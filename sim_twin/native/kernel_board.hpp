@@ -43,15 +43,14 @@ class BoardSide {
 };
 
 struct HostBoardOptions {
-  double clock_ppm = 0.0;             // board clock fast against true time
-  std::uint32_t clock_start_us = 0;   // board clock when the run begins
-  double byte_us = 10e6 / 57600.0;    // UART time of one byte
+  double clock_ppm = 0.0;            // board clock fast against true time
+  std::uint32_t clock_start_us = 0;  // board clock when the run begins
+  double byte_us = 10e6 / 57600.0;   // UART time of one byte
 };
 
 class HostBoard final : public BoardSide {
  public:
-  explicit HostBoard(const HostBoardOptions& options)
-      : options_(options), eeprom_(hil::STORAGE_SIZE, 0xFF) {}
+  explicit HostBoard(const HostBoardOptions& options) : options_(options), eeprom_(hil::STORAGE_SIZE, 0xFF) {}
   void set_reset(bool held, std::int64_t t_us, const std::uint8_t pins[2]) override;
   void edge(const PinEdge& edge) override { edges_.push_back(edge); }
   void receive(std::int64_t t_us, std::string bytes) override;
@@ -62,7 +61,7 @@ class HostBoard final : public BoardSide {
   std::uint32_t clock_us(double t_us) const;
   double next_tick_us() const;
   void drive(const hil::BoardOutputs& outputs);
-  void catch_up(double t_us);   // edges and received bytes up to t_us
+  void catch_up(double t_us);  // edges and received bytes up to t_us
   void tick(double t_us, double battery_v);
   void transmit(double t_us);
 
@@ -70,17 +69,17 @@ class HostBoard final : public BoardSide {
   hil::Board board_{};
   hil::Quadrature encoder_[2]{};
   hil::BoardOutputs outputs_{};
-  double duty_[2] = {0.0, 0.0};     // what the outputs are to the motors
-  double next_us_ = 0.0;            // of the next period
+  double duty_[2] = {0.0, 0.0};  // what the outputs are to the motors
+  double next_us_ = 0.0;         // of the next period
   std::vector<PinEdge> edges_;
   std::size_t edges_done_ = 0;
   std::deque<Chunk> received_;
   std::vector<std::uint8_t> eeprom_;  // as it comes new; keeps what it holds through a reset
   bool held_ = true;
-  double boot_us_ = 0.0;            // true time at which the board's clock showed clock_boot_us_
+  double boot_us_ = 0.0;  // true time at which the board's clock showed clock_boot_us_
   std::uint32_t clock_boot_us_ = 0;
   std::int64_t ticks_ = 0;
-  double uart_free_us_ = 0.0;       // when the last byte given to the UART will have left
+  double uart_free_us_ = 0.0;  // when the last byte given to the UART will have left
 };
 
 }  // namespace twin

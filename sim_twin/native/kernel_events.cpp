@@ -32,8 +32,7 @@ double noise(std::uint64_t seed, double t_s, double frequency_hz) {
   const double p0 = knot(seed, k - 1), p1 = knot(seed, k);
   const double p2 = knot(seed, k + 1), p3 = knot(seed, k + 2);
   const double value =
-      p1 + 0.5 * u * (p2 - p0 + u * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3 +
-                                     u * (3.0 * (p1 - p2) + p3 - p0)));
+      p1 + 0.5 * u * (p2 - p0 + u * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3 + u * (3.0 * (p1 - p2) + p3 - p0)));
   return value / std::sqrt(57.0 / 70.0);  // mean over u of the sum of squared weights
 }
 

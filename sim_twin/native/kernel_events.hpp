@@ -39,16 +39,16 @@ class Disturbances {
 };
 
 // Faults of encoder, motors and board, with the scenario's name (hil.config.events.FaultKind).
-#define TWIN_FAULTS(X)                  \
-  X(kDeadEncoder, "dead_encoder")       \
-  X(kDeadChannelA, "dead_channel_a")    \
-  X(kDeadChannelB, "dead_channel_b")    \
-  X(kSwappedPhases, "swapped_phases")   \
-  X(kEncoderNoise, "encoder_noise")     \
-  X(kGearSlip, "gear_slip")             \
-  X(kMotorReversed, "motor_reversed")   \
-  X(kMotorStuck, "motor_stuck")         \
-  X(kMotorWeak, "motor_weak")           \
+#define TWIN_FAULTS(X)                        \
+  X(kDeadEncoder, "dead_encoder")             \
+  X(kDeadChannelA, "dead_channel_a")          \
+  X(kDeadChannelB, "dead_channel_b")          \
+  X(kSwappedPhases, "swapped_phases")         \
+  X(kEncoderNoise, "encoder_noise")           \
+  X(kGearSlip, "gear_slip")                   \
+  X(kMotorReversed, "motor_reversed")         \
+  X(kMotorStuck, "motor_stuck")               \
+  X(kMotorWeak, "motor_weak")                 \
   X(kMotorsExchanged, "motors_exchanged")     \
   X(kEncodersExchanged, "encoders_exchanged") \
   X(kBoardReset, "board_reset")

@@ -20,8 +20,7 @@ double Serialiser::send(double t_s, std::size_t size) {
   return free_s_;
 }
 
-Channel::Channel(const ChannelOptions& options, const Chance& chance)
-    : options_(options), chance_(chance) {
+Channel::Channel(const ChannelOptions& options, const Chance& chance) : options_(options), chance_(chance) {
   if (options_.corruption_ratio != 0.0) clean_ = clean_bytes();
 }
 

@@ -39,7 +39,7 @@ PairedState paired(const StateVector& x) {
 }
 
 StateVector listed(const PairedState& x) {
-  return {x[kPosition][0], x[kPosition][1], x[kTurn][0],  x[kEta][0],   x[kEta][1],
+  return {x[kPosition][0], x[kPosition][1], x[kTurn][0],    x[kEta][0],   x[kEta][1],
           x[kTurn][1],     x[kCurrent][0],  x[kCurrent][1], x[kWheel][0], x[kWheel][1],
           x[kOmega][0],    x[kOmega][1],    x[kBattery][0]};
 }
@@ -72,8 +72,8 @@ Plant::Derived Plant::derive(const PlantParams& p) {
   }
   const double rim_kg = 2.0 * d.side_inertia * d.per_radius * d.per_radius;
   d.per_mass_rim = 1.0 / (p.mass_kg + rim_kg);
-  d.per_inertia_rim = 1.0 / (p.inertia_kg_m2 + p.mass_kg * p.d0_m * p.d0_m +
-                             0.25 * p.track_m * p.track_m * rim_kg);
+  d.per_inertia_rim =
+      1.0 / (p.inertia_kg_m2 + p.mass_kg * p.d0_m * p.d0_m + 0.25 * p.track_m * p.track_m * rim_kg);
   return d;
 }
 
@@ -101,8 +101,7 @@ double Plant::draw_a(Pair current_a, const Drive& drive) const {
 }
 
 double Plant::battery_v(double charge_ratio, double draw_a, double sag_v) const {
-  const double open_v =
-      p_.battery_empty_v + (p_.battery_full_v - p_.battery_empty_v) * charge_ratio;
+  const double open_v = p_.battery_empty_v + (p_.battery_full_v - p_.battery_empty_v) * charge_ratio;
   // A sag above what is there leaves nothing; it does not reverse the motors.
   return std::max(open_v - p_.battery_resistance_ohm * draw_a - sag_v, 0.0);
 }
@@ -117,37 +116,31 @@ double Plant::brake(double torque_n_m, double omega_rad_s) const {
 }
 
 // Motor, bridge and gear of both sides (2.11).
-Plant::Sides Plant::sides(Pair current_a, Pair omega_rad_s, const Drive& drive,
-                          const LoadVector& load, double battery_v) const {
+Plant::Sides Plant::sides(Pair current_a, Pair omega_rad_s, const Drive& drive, const LoadVector& load,
+                          double battery_v) const {
   const Pair channel_a = p_.motor_per_side * current_a;
-  const Pair drop_v = p_.bridge_drop_v * soft_sign(channel_a, p_.bridge_smoothing_a) +
-                      p_.bridge_resistance_ohm * channel_a;
+  const Pair drop_v =
+      p_.bridge_drop_v * soft_sign(channel_a, p_.bridge_smoothing_a) + p_.bridge_resistance_ohm * channel_a;
   const Pair gear_n_m = d_.gear_n_m_a * current_a;
   const Pair sign = soft_sign(omega_rad_s * p_.wheel_radius_m, p_.floor_smoothing_m_s);
   const Pair ratio = omega_rad_s * d_.per_stribeck;
   // Gear loss is friction in proportion to load: eta_g k_t N i when driving, as printed, and no
   // gain of energy when the wheel drives the motor, where eta_g would have to divide.
-  const Pair coulomb_n_m =
-      p_.motor_coulomb_n_m +
-      (p_.motor_stiction_n_m - p_.motor_coulomb_n_m) / (1.0 + ratio * ratio) +
-      (1.0 - p_.motor_gear_efficiency_ratio) * magnitude(gear_n_m);
+  const Pair coulomb_n_m = p_.motor_coulomb_n_m +
+                           (p_.motor_stiction_n_m - p_.motor_coulomb_n_m) / (1.0 + ratio * ratio) +
+                           (1.0 - p_.motor_gear_efficiency_ratio) * magnitude(gear_n_m);
   const Pair friction_n_m = sign * coulomb_n_m + p_.motor_viscous_n_m_s_rad * omega_rad_s;
-  const Pair brake_n_m = {brake(load[kBrakeLeft], omega_rad_s[0]),
-                          brake(load[kBrakeRight], omega_rad_s[1])};
+  const Pair brake_n_m = {brake(load[kBrakeLeft], omega_rad_s[0]), brake(load[kBrakeRight], omega_rad_s[1])};
   Sides out;
-  out.current_dot =
-      d_.per_inductance * (drive.duty * battery_v - drop_v - d_.emf_v_s * omega_rad_s -
-                           p_.motor_resistance_ohm * current_a);
-  out.torque_n_m =
-      p_.motor_per_side * (gear_n_m - friction_n_m) - drive.jam * omega_rad_s -
-      Pair{load[kLoadLeft], load[kLoadRight]} - brake_n_m;
+  out.current_dot = d_.per_inductance * (drive.duty * battery_v - drop_v - d_.emf_v_s * omega_rad_s -
+                                         p_.motor_resistance_ohm * current_a);
+  out.torque_n_m = p_.motor_per_side * (gear_n_m - friction_n_m) - drive.jam * omega_rad_s -
+                   Pair{load[kLoadLeft], load[kLoadRight]} - brake_n_m;
   out.rolling_sign = sign;
   return out;
 }
 
-Plant::Heading Plant::heading(double theta_rad) {
-  return {std::cos(theta_rad), std::sin(theta_rad)};
-}
+Plant::Heading Plant::heading(double theta_rad) { return {std::cos(theta_rad), std::sin(theta_rad)}; }
 
 // Within a step the heading turns by some 1e-4 rad: the series is exact to the last bit there, at a
 // fraction of the functions' cost.
@@ -159,8 +152,7 @@ Plant::Heading Plant::turned(const Heading& from, double by_rad) {
   return {from.cos - (from.cos * less + from.sin * s), from.sin - (from.sin * less - from.cos * s)};
 }
 
-StateVector Plant::derivative(const StateVector& x, const Drive& drive,
-                              const LoadVector& load) const {
+StateVector Plant::derivative(const StateVector& x, const Drive& drive, const LoadVector& load) const {
   return listed(derivative(paired(x), heading(x[kTheta]), drive, load));
 }
 
@@ -194,8 +186,8 @@ PairedState Plant::derivative(const PairedState& x, const Heading& at, const Dri
 
 // Rolling wheels and eta2 = -d0 theta_dot: (S'MS) eta_dot = S'(G tau - F - M S_dot eta), written
 // for (eta1, theta_dot), with the inertia of wheels and rotors in both.
-Plant::Acceleration Plant::constrained(const PairedState& x, const Sides& both,
-                                       const LoadVector& load, const double* gravity) const {
+Plant::Acceleration Plant::constrained(const PairedState& x, const Sides& both, const LoadVector& load,
+                                       const double* gravity) const {
   const double m = p_.mass_kg, half = 0.5 * p_.track_m, d0 = p_.d0_m;
   const double w = x[kTurn][1], eta1 = x[kEta][0], eta2 = x[kEta][1];
   const Pair rim_n =
@@ -204,15 +196,15 @@ Plant::Acceleration Plant::constrained(const PairedState& x, const Sides& both,
   const Pair axle_m = {p_.front_axle_m, -p_.rear_axle_m};
   const Pair slide_n = grip(load) * Pair{d_.slide_front_n, d_.slide_rear_n} *
                        soft_sign(eta2 + axle_m * w, p_.floor_smoothing_m_s);
-  const double lateral_n = sum(slide_n);              // F_y
-  const double scrub_n_m = sum(axle_m * slide_n);     // in M_r
+  const double lateral_n = sum(slide_n);           // F_y
+  const double scrub_n_m = sum(axle_m * slide_n);  // in M_r
 
   const double push_x = load[kForceForward] + m * gravity[0];
   const double push_y = load[kForceLeft] + m * gravity[1];
   Acceleration acc;
   acc.eta1_dot = (sum(rim_n) + push_x + m * eta2 * w) * d_.per_mass_rim + load[kAccForward];
-  double moment = half * (rim_n[1] - rim_n[0]) - scrub_n_m + load[kTorqueYaw] +
-                        d0 * (lateral_n - push_y + m * eta1 * w);
+  double moment =
+      half * (rim_n[1] - rim_n[0]) - scrub_n_m + load[kTorqueYaw] + d0 * (lateral_n - push_y + m * eta1 * w);
   if (p_.castor) {
     const Pair drag_n = castor_drag(x, grip(load), p_.floor_smoothing_m_s);
     acc.eta1_dot -= drag_n[0] * d_.per_mass_rim;
@@ -230,8 +222,8 @@ Pair Plant::rolling(double eta1, double w) const {
 
 // Four Coulomb contacts: each pushes against the slip velocity of its patch, so that sliding
 // sideways takes grip from driving and the other way round.
-Plant::Acceleration Plant::slipping(const PairedState& x, const Sides& both,
-                                    const LoadVector& load, const double* gravity) const {
+Plant::Acceleration Plant::slipping(const PairedState& x, const Sides& both, const LoadVector& load,
+                                    const double* gravity) const {
   const double m = p_.mass_kg, r = p_.wheel_radius_m, half = 0.5 * p_.track_m;
   const double w = x[kTurn][1], eta1 = x[kEta][0], eta2 = x[kEta][1];
   const double v_s = p_.floor_slip_smoothing_m_s;
@@ -258,8 +250,7 @@ Plant::Acceleration Plant::slipping(const PairedState& x, const Sides& both,
   const Pair rim_n = grip(load) * d_.roll_n * both.rolling_sign + drive_n;
   Acceleration acc;
   acc.omega_dot = (both.torque_n_m - r * rim_n) / d_.side_inertia;
-  acc.eta1_dot =
-      (body_n[0] + load[kForceForward]) / m + gravity[0] + eta2 * w + load[kAccForward];
+  acc.eta1_dot = (body_n[0] + load[kForceForward]) / m + gravity[0] + eta2 * w + load[kAccForward];
   acc.eta2_dot = (body_n[1] + load[kForceLeft]) / m + gravity[1] - eta1 * w + load[kAccLateral];
   acc.theta_ddot = (moment + load[kTorqueYaw]) / p_.inertia_kg_m2 + load[kAccYaw];
   return acc;
@@ -277,8 +268,8 @@ Plant::Acceleration Plant::hanging(const Sides& both) const {
   return {0.0, 0.0, 0.0, both.torque_n_m / d_.side_inertia};
 }
 
-void Plant::step(double h_s, const Drive& drive, const LoadVector& begin,
-                 const LoadVector& middle, const LoadVector& end) {
+void Plant::step(double h_s, const Drive& drive, const LoadVector& begin, const LoadVector& middle,
+                 const LoadVector& end) {
   rest_.holds = false;
   const PairedState x = paired(x_);
   const Heading at = heading(x_[kTheta]);
@@ -312,8 +303,7 @@ bool Plant::is_rest(const StateVector& before, const Drive& drive) const {
 
 void Plant::step(double h_s, const Drive& drive) {
   constexpr LoadVector kNone{};
-  if (rest_.holds && rest_.h_s == h_s &&
-      std::memcmp(&rest_.drive, &drive, sizeof drive) == 0) {
+  if (rest_.holds && rest_.h_s == h_s && std::memcmp(&rest_.drive, &drive, sizeof drive) == 0) {
     x_[kCharge] += rest_.charge_change;
     return;
   }

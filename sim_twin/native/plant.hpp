@@ -14,6 +14,7 @@ namespace twin {
 #define TWIN_INLINE [[gnu::always_inline]] inline
 
 // One list: C++ fields, their Python names, and what a caller must set (no defaults).
+// clang-format off
 #define TWIN_PLANT_PARAMETERS(X)                                                              \
   X(mass_kg) X(inertia_kg_m2) X(wheel_radius_m) X(track_m) X(front_axle_m) X(rear_axle_m)    \
   X(d0_m) X(wheel_inertia_kg_m2)                                                              \
@@ -26,6 +27,7 @@ namespace twin {
   X(battery_charge_start_ratio) X(battery_idle_a)                                             \
   X(floor_rolling_ratio) X(floor_friction_ratio) X(floor_smoothing_m_s)                       \
   X(floor_slip_smoothing_m_s)
+// clang-format on
 
 struct PlantParams {
 #define X(name) double name = 0.0;
@@ -41,12 +43,19 @@ struct PlantParams {
 
 // Index of each state in the vector that is integrated.
 enum State : int {
-  kX, kY, kTheta,              // m, m, rad: centre of mass in the world
-  kEta1, kEta2, kThetaDot,     // m/s, m/s, rad/s: body frame; eta2 = -d0 theta_dot unless slip
-  kCurrentL, kCurrentR,        // A, one motor of each side
-  kWheelL, kWheelR,            // rad, wheel angles
-  kOmegaL, kOmegaR,            // rad/s, wheel speeds; follow from eta unless slip
-  kCharge,                     // 0..1
+  kX,
+  kY,
+  kTheta,  // m, m, rad: centre of mass in the world
+  kEta1,
+  kEta2,
+  kThetaDot,  // m/s, m/s, rad/s: body frame; eta2 = -d0 theta_dot unless slip
+  kCurrentL,
+  kCurrentR,  // A, one motor of each side
+  kWheelL,
+  kWheelR,  // rad, wheel angles
+  kOmegaL,
+  kOmegaR,  // rad/s, wheel speeds; follow from eta unless slip
+  kCharge,  // 0..1
   kStates
 };
 using StateVector = std::array<double, kStates>;
@@ -56,8 +65,10 @@ enum PairIndex : int {
   kPosition,  // X, Y
   kTurn,      // theta, theta_dot
   kEta,       // eta1, eta2
-  kCurrent, kWheel, kOmega,  // left, right
-  kBattery,   // charge, nothing
+  kCurrent,
+  kWheel,
+  kOmega,    // left, right
+  kBattery,  // charge, nothing
   kPairs
 };
 using PairedState = std::array<Pair, kPairs>;
@@ -68,30 +79,30 @@ using PairedState = std::array<Pair, kPairs>;
 // when positive, also at rest; a brake opposes the wheel's motion whichever way (below 0 it is 0);
 // slopes raise the floor along world X and Y; the friction change is added to 1 (below 0 it is 0), and
 // the sag takes the battery down to 0 V at most.
-#define TWIN_LOADS(X)                       \
-  X(kAccForward, "eta1_dot_m_s2")           \
-  X(kAccLateral, "eta2_dot_m_s2")           \
-  X(kAccYaw, "theta_ddot_rad_s2")           \
-  X(kForceForward, "force_forward_n")       \
-  X(kForceLeft, "force_left_n")             \
-  X(kTorqueYaw, "torque_yaw_n_m")           \
-  X(kLoadLeft, "load_left_n_m")             \
-  X(kLoadRight, "load_right_n_m")           \
-  X(kBrakeLeft, "brake_left_n_m")           \
-  X(kBrakeRight, "brake_right_n_m")         \
-  X(kSlopeX, "slope_x_rad")                 \
-  X(kSlopeY, "slope_y_rad")                 \
+#define TWIN_LOADS(X)                         \
+  X(kAccForward, "eta1_dot_m_s2")             \
+  X(kAccLateral, "eta2_dot_m_s2")             \
+  X(kAccYaw, "theta_ddot_rad_s2")             \
+  X(kForceForward, "force_forward_n")         \
+  X(kForceLeft, "force_left_n")               \
+  X(kTorqueYaw, "torque_yaw_n_m")             \
+  X(kLoadLeft, "load_left_n_m")               \
+  X(kLoadRight, "load_right_n_m")             \
+  X(kBrakeLeft, "brake_left_n_m")             \
+  X(kBrakeRight, "brake_right_n_m")           \
+  X(kSlopeX, "slope_x_rad")                   \
+  X(kSlopeY, "slope_y_rad")                   \
   X(kFrictionChange, "friction_change_ratio") \
   X(kBatterySag, "battery_sag_v")
 enum Load : int {
 #define X(id, name) id,
   TWIN_LOADS(X)
 #undef X
-  kLoads
+      kLoads
 };
 using LoadVector = std::array<double, kLoads>;
 
-struct Drive {  // left, right; held over a step
+struct Drive {             // left, right; held over a step
   Pair duty = {0.0, 0.0};  // -1..1
   Pair jam = {0.0, 0.0};   // N m s/rad, gear jam as a stiff damper
 };
@@ -116,8 +127,8 @@ class Plant {
     rest_.holds = false;
     return x_;
   }
-  double battery_v(const Drive& drive, double sag_v) const;  // at the terminals, now
-  double charge_after(double h_s, const Drive& drive) const; // at the current drawn now
+  double battery_v(const Drive& drive, double sag_v) const;   // at the terminals, now
+  double charge_after(double h_s, const Drive& drive) const;  // at the current drawn now
   StateVector derivative(const StateVector& x, const Drive& drive, const LoadVector& load) const;
 
  private:
@@ -130,18 +141,18 @@ class Plant {
     double eta1_dot, eta2_dot, theta_ddot;  // m/s^2, m/s^2, rad/s^2, body frame
     Pair omega_dot;                         // rad/s^2
   };
-  TWIN_INLINE Sides sides(Pair current_a, Pair omega_rad_s, const Drive& drive,
-                          const LoadVector& load, double battery_v) const;
+  TWIN_INLINE Sides sides(Pair current_a, Pair omega_rad_s, const Drive& drive, const LoadVector& load,
+                          double battery_v) const;
   // Quotients that do not change, because a division costs as much as ten products.
   struct Derived {
     double per_radius, per_inductance, per_stribeck, per_charge;
-    double side_inertia;              // kg m^2, wheels and reflected rotors of one side
-    double emf_v_s, gear_n_m_a;       // V per rad/s and N m per A at the wheel
-    double weight_n;                  // m g
-    double roll_n;                    // rolling resistance of one side
-    double slide_front_n, slide_rear_n;   // sliding friction of the wheels in front, in the rear
-    double castor_n;                      // friction of the castor
-    double per_mass_rim, per_inertia_rim; // 1 / (m + rims), 1 / (I + m d0^2 + rims): (S'MS)^-1
+    double side_inertia;                   // kg m^2, wheels and reflected rotors of one side
+    double emf_v_s, gear_n_m_a;            // V per rad/s and N m per A at the wheel
+    double weight_n;                       // m g
+    double roll_n;                         // rolling resistance of one side
+    double slide_front_n, slide_rear_n;    // sliding friction of the wheels in front, in the rear
+    double castor_n;                       // friction of the castor
+    double per_mass_rim, per_inertia_rim;  // 1 / (m + rims), 1 / (I + m d0^2 + rims): (S'MS)^-1
   };
 
   struct Heading {
@@ -156,8 +167,8 @@ class Plant {
   TWIN_INLINE double brake(double torque_n_m, double omega_rad_s) const;
   TWIN_INLINE PairedState derivative(const PairedState& x, const Heading& at, const Drive& drive,
                                      const LoadVector& load) const;
-  TWIN_INLINE Acceleration constrained(const PairedState& x, const Sides& both,
-                                       const LoadVector& load, const double* gravity) const;
+  TWIN_INLINE Acceleration constrained(const PairedState& x, const Sides& both, const LoadVector& load,
+                                       const double* gravity) const;
   Acceleration slipping(const PairedState& x, const Sides& both, const LoadVector& load,
                         const double* gravity) const;
   Acceleration hanging(const Sides& both) const;

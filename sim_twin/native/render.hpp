@@ -15,146 +15,143 @@ namespace camera {
 using Colour = std::array<float, 3>;  // reflectance: blue, green, red
 
 struct View {
-    int width = 0, height = 0;  // px
-    double fx = 0, fy = 0, cx = 0, cy = 0;  // px
-    std::array<double, 5> dist{};  // k1 k2 p1 p2 k3
-    std::array<double, 9> R{};  // camera to world, by rows
-    std::array<double, 3> t{};  // camera centre, m
+  int width = 0, height = 0;              // px
+  double fx = 0, fy = 0, cx = 0, cy = 0;  // px
+  std::array<double, 5> dist{};           // k1 k2 p1 p2 k3
+  std::array<double, 9> R{};              // camera to world, by rows
+  std::array<double, 3> t{};              // camera centre, m
 };
 
 // A disc (radius half_x) or rectangle on the plate, body frame, m.
 struct Patch {
-    bool disc = false, mark = false;
-    float x = 0, y = 0, half_x = 0, half_y = 0;
-    Colour colour{};
+  bool disc = false, mark = false;
+  float x = 0, y = 0, half_x = 0, half_y = 0;
+  Colour colour{};
 };
 
 // A square grid of black and white cells on the plate (ArUco), rows from body +x down, m.
 struct Grid {
-    int cells = 0;  // per side, 0 for none
-    float x = 0, y = 0, half = 0, margin = 0;
-    std::vector<uint8_t> white;
+  int cells = 0;  // per side, 0 for none
+  float x = 0, y = 0, half = 0, margin = 0;
+  std::vector<uint8_t> white;
 };
 
 // Upright box, or flat disc when `disc` (radius half_x at height top), world frame, m.
 struct Block {
-    bool disc = false;
-    float x = 0, y = 0, half_x = 0, half_y = 0, theta = 0, top = 0;
-    Colour colour{};
-    float c = 1, s = 0;  // of theta, set by the renderer
+  bool disc = false;
+  float x = 0, y = 0, half_x = 0, half_y = 0, theta = 0, top = 0;
+  Colour colour{};
+  float c = 1, s = 0;  // of theta, set by the renderer
 };
 
 // Straight flat bar above the robot, m; ends in the world or in the body frame.
 struct Bar {
-    bool body = false;
-    float x0 = 0, y0 = 0, x1 = 0, y1 = 0, half_width = 0, z = 0;
-    Colour colour{};
+  bool body = false;
+  float x0 = 0, y0 = 0, x1 = 0, y1 = 0, half_width = 0, z = 0;
+  Colour colour{};
 };
 
 struct Robot {
-    float half_length = 0, half_width = 0, bottom = 0, top = 0;  // body box, m
-    float wheel_radius = 0, wheel_half_width = 0, half_track = 0, half_base = 0;  // m
-    float axle_x = 0;  // middle of the axles, m
-    Colour plate{}, side{}, tyre{}, hub{};
-    std::vector<Patch> patches;  // the last one drawn lies on top
-    Grid tag;
+  float half_length = 0, half_width = 0, bottom = 0, top = 0;                   // body box, m
+  float wheel_radius = 0, wheel_half_width = 0, half_track = 0, half_base = 0;  // m
+  float axle_x = 0;                                                             // middle of the axles, m
+  Colour plate{}, side{}, tyre{}, hub{};
+  std::vector<Patch> patches;  // the last one drawn lies on top
+  Grid tag;
 };
 
 struct Scene {
-    std::vector<float> texture;  // floor reflectance factor, periodic, by rows
-    int texture_size = 0;  // px per side
-    float texture_step = 0;  // m per px
-    Colour floor{};
-    std::vector<Block> blocks;
-    std::vector<Bar> bars;
-    std::vector<float> light;  // DN of a white surface, per pixel
-    std::vector<float> glare;  // DN added, per pixel
-    Colour white_balance{};
-    float blur = 0;  // px RMS
-    float read_noise = 0, dn_per_electron = 0;  // DN
-    float lamp_x = 0, lamp_y = 0, shade = 0;  // lean towards the lamp; share of light taken
+  std::vector<float> texture;  // floor reflectance factor, periodic, by rows
+  int texture_size = 0;        // px per side
+  float texture_step = 0;      // m per px
+  Colour floor{};
+  std::vector<Block> blocks;
+  std::vector<Bar> bars;
+  std::vector<float> light;  // DN of a white surface, per pixel
+  std::vector<float> glare;  // DN added, per pixel
+  Colour white_balance{};
+  float blur = 0;                             // px RMS
+  float read_noise = 0, dn_per_electron = 0;  // DN
+  float lamp_x = 0, lamp_y = 0, shade = 0;    // lean towards the lamp; share of light taken
 };
 
 struct Pose {
-    float x = 0, y = 0, c = 1, s = 0;
+  float x = 0, y = 0, c = 1, s = 0;
 };
 
 // A line of sight as the point where it meets the floor and its lean d(x, y)/dz.
 struct Sight {
-    float x = 0, y = 0, lx = 0, ly = 0;
+  float x = 0, y = 0, lx = 0, ly = 0;
 };
 
 // Lines of sight within one pixel: linear, as the lean curves by 1e-6 per px^2, 2 um on the floor.
 struct SightPatch {
-    Sight middle, per_u, per_v;
-    Sight at(float du, float dv) const {
-        return {middle.x + per_u.x * du + per_v.x * dv, middle.y + per_u.y * du + per_v.y * dv,
-                middle.lx + per_u.lx * du + per_v.lx * dv,
-                middle.ly + per_u.ly * du + per_v.ly * dv};
-    }
+  Sight middle, per_u, per_v;
+  Sight at(float du, float dv) const {
+    return {middle.x + per_u.x * du + per_v.x * dv, middle.y + per_u.y * du + per_v.y * dv,
+            middle.lx + per_u.lx * du + per_v.lx * dv, middle.ly + per_u.ly * du + per_v.ly * dv};
+  }
 };
 
 // Where in its pixel and when in the exposure one sample is taken.
 struct Sample {
-    float du = 0, dv = 0;
-    int slot = 0;
+  float du = 0, dv = 0;
+  int slot = 0;
 };
 
 class Renderer {
-public:
-    Renderer(const View& view, const Scene& scene, const Robot& robot, uint64_t seed);
-    // The same scene with other noise: nothing but the noise is worked out anew.
-    Renderer(const Renderer& other, uint64_t seed);
+ public:
+  Renderer(const View& view, const Scene& scene, const Robot& robot, uint64_t seed);
+  // The same scene with other noise: nothing but the noise is worked out anew.
+  Renderer(const Renderer& other, uint64_t seed);
 
-    // Writes the frame `index`, (height, width, 3); poses are (x, y, theta), evenly spaced from
-    // the start to the end of the exposure.
-    void make(uint64_t index, const std::vector<std::array<double, 3>>& poses, uint8_t* out);
+  // Writes the frame `index`, (height, width, 3); poses are (x, y, theta), evenly spaced from
+  // the start to the end of the exposure.
+  void make(uint64_t index, const std::vector<std::array<double, 3>>& poses, uint8_t* out);
 
-private:
-    struct Window {
-        int u0, v0, u1, v1;
-    };
-    void background();
-    void edge_table();
-    void noise_bank();
-    void sample_table();
-    Colour floor_sample(const Sight& sight) const;
-    SightPatch sight_patch(int u, int v) const;
-    static std::vector<Pose> slots_of(const std::vector<std::array<double, 3>>& poses);
-    static bool same(const std::vector<Pose>& a, const std::vector<Pose>& b);
-    Window window(double reach_m) const;
-    void set_windows();
-    void classify();
-    void composite();
-    void composite_pixel(int u, int v, uint8_t flags, uint8_t id, float shade, float* dn) const;
-    void trace_samples(int u, int v, const Sample* samples, int count, uint8_t flags,
-                       uint8_t* hits) const;
-    uint8_t trace(const Sight& world, const Pose& pose) const;
-    uint8_t trace_top(float x, float y) const;
-    uint8_t trace_sides(const Sight& body) const;
-    void shade_row(const Sight* floor, int count, float* shade) const;
-    void quantise(const float* dn, int count, int16_t* level, int16_t* sigma) const;
-    void emit(const int16_t* level, const int16_t* sigma, const int16_t* normal, int count,
-              uint8_t* out) const;
+ private:
+  struct Window {
+    int u0, v0, u1, v1;
+  };
+  void background();
+  void edge_table();
+  void noise_bank();
+  void sample_table();
+  Colour floor_sample(const Sight& sight) const;
+  SightPatch sight_patch(int u, int v) const;
+  static std::vector<Pose> slots_of(const std::vector<std::array<double, 3>>& poses);
+  static bool same(const std::vector<Pose>& a, const std::vector<Pose>& b);
+  Window window(double reach_m) const;
+  void set_windows();
+  void classify();
+  void composite();
+  void composite_pixel(int u, int v, uint8_t flags, uint8_t id, float shade, float* dn) const;
+  void trace_samples(int u, int v, const Sample* samples, int count, uint8_t flags, uint8_t* hits) const;
+  uint8_t trace(const Sight& world, const Pose& pose) const;
+  uint8_t trace_top(float x, float y) const;
+  uint8_t trace_sides(const Sight& body) const;
+  void shade_row(const Sight* floor, int count, float* shade) const;
+  void quantise(const float* dn, int count, int16_t* level, int16_t* sigma) const;
+  void emit(const int16_t* level, const int16_t* sigma, const int16_t* normal, int count, uint8_t* out) const;
 
-    View view_;
-    Scene scene_;
-    Robot robot_;
-    uint64_t seed_;
-    std::vector<Sight> sight_;  // per pixel centre
-    std::vector<float> floor_dn_, glare_dn_;  // background before noise: what shade takes, the rest
-    std::vector<int16_t> level_, sigma_;  // the same in the noise stage's steps
-    std::vector<int16_t> normal_;
-    std::vector<Sample> samples_;
-    std::vector<Colour> colour_of_id_;
-    std::vector<uint8_t> mark_id_, edge_of_ids_;
-    int reach_ = 1;  // px that the lens blur carries an edge
-    float robot_radius_ = 0, robot_height_ = 0;
-    std::vector<Pose> slots_;  // as last composited into the window buffers
-    Window shaded_{0, 0, 0, 0}, hidden_{0, 0, 0, 0};  // what the robot shades; what it may hide
-    std::vector<uint8_t> id_first_, id_last_, flags_, flags_row_;
-    std::vector<float> dn_, shade_;
-    std::vector<int16_t> window_level_, window_sigma_;
+  View view_;
+  Scene scene_;
+  Robot robot_;
+  uint64_t seed_;
+  std::vector<Sight> sight_;                // per pixel centre
+  std::vector<float> floor_dn_, glare_dn_;  // background before noise: what shade takes, the rest
+  std::vector<int16_t> level_, sigma_;      // the same in the noise stage's steps
+  std::vector<int16_t> normal_;
+  std::vector<Sample> samples_;
+  std::vector<Colour> colour_of_id_;
+  std::vector<uint8_t> mark_id_, edge_of_ids_;
+  int reach_ = 1;  // px that the lens blur carries an edge
+  float robot_radius_ = 0, robot_height_ = 0;
+  std::vector<Pose> slots_;                         // as last composited into the window buffers
+  Window shaded_{0, 0, 0, 0}, hidden_{0, 0, 0, 0};  // what the robot shades; what it may hide
+  std::vector<uint8_t> id_first_, id_last_, flags_, flags_row_;
+  std::vector<float> dn_, shade_;
+  std::vector<int16_t> window_level_, window_sigma_;
 };
 
 // Normalised, undistorted coordinates of a pixel, by fixed-point iteration.

@@ -6,14 +6,14 @@
 namespace camera {
 
 enum Id : uint8_t {
-    ID_FLOOR = 0,
-    ID_SIDE,
-    ID_TYRE,
-    ID_HUB,
-    ID_PLATE,  // from here to the last patch everything lies in the plate's plane
-    ID_TAG_WHITE,
-    ID_TAG_BLACK,
-    ID_PATCH,
+  ID_FLOOR = 0,
+  ID_SIDE,
+  ID_TYRE,
+  ID_HUB,
+  ID_PLATE,  // from here to the last patch everything lies in the plate's plane
+  ID_TAG_WHITE,
+  ID_TAG_BLACK,
+  ID_PATCH,
 };
 
 // What lies near a pixel: an edge, one not in the plate's plane alone, one of a mark, one of more

@@ -15,13 +15,8 @@ constexpr double kFar_s = std::numeric_limits<double>::infinity();
 
 Rig::Rig(Kernel& kernel, const RigOptions& options, const Channel& down, const Channel& up,
          const Shutter& shutter)
-    : kernel_(kernel),
-      options_(options),
-      down_(down),
-      up_(up),
-      port_(kBitsPerByte / options.baud),
-      shutter_(shutter),
-      now_s_(options.start_s) {}
+    : kernel_(kernel), options_(options), down_(down), up_(up), port_(kBitsPerByte / options.baud),
+      shutter_(shutter), now_s_(options.start_s) {}
 
 void Rig::set_spans(std::vector<Span> stalls, std::vector<Span> hidden) {
   stalls_ = std::move(stalls);

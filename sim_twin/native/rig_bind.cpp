@@ -73,30 +73,48 @@ void bind_parts(nb::module_& m) {
       .def(nb::init<double>(), "byte_s"_a)
       .def("send", &twin::Serialiser::send, "t_s"_a, "size"_a);
   nb::class_<twin::Channel>(m, "Channel")
-      .def("__init__", [](twin::Channel* self, double latency_s, double jitter_s, double to_good, double to_bad, double corruption_ratio, const Words& chance) { new (self) twin::Channel({latency_s, jitter_s, to_good, to_bad, corruption_ratio},
-                                                                                                                                                                                          chance_of(chance)); }, "latency_s"_a, "jitter_s"_a, "to_good"_a, "to_bad"_a, "corruption_ratio"_a, "chance"_a)
+      .def(
+          "__init__",
+          [](twin::Channel* self, double latency_s, double jitter_s, double to_good, double to_bad,
+             double corruption_ratio, const Words& chance) {
+            new (self)
+                twin::Channel({latency_s, jitter_s, to_good, to_bad, corruption_ratio}, chance_of(chance));
+          },
+          "latency_s"_a, "jitter_s"_a, "to_good"_a, "to_bad"_a, "corruption_ratio"_a, "chance"_a)
       .def("carry", &carried, "t_s"_a, "data"_a)
       .def_rw("cuts", &twin::Channel::cuts)
       .def_rw("doubles", &twin::Channel::doubles)
       .def_rw("swaps", &twin::Channel::swaps);
   nb::class_<twin::Shutter>(m, "Shutter")
-      .def("__init__", [](twin::Shutter* self, double period_s, double exposure_s, double latency_s, double jitter_s, double drop_ratio, double t_first_s, double clock_start_s, double clock_rate, double most_sigmas, const Words& chance) { new (self) twin::Shutter({period_s, exposure_s, latency_s, jitter_s, drop_ratio,
-                                                                                                                                                                                                                                                                         t_first_s, clock_start_s, clock_rate, most_sigmas},
-                                                                                                                                                                                                                                                                        chance_of(chance)); }, "period_s"_a, "exposure_s"_a, "latency_s"_a, "jitter_s"_a, "drop_ratio"_a, "t_first_s"_a, "clock_start_s"_a, "clock_rate"_a, "most_sigmas"_a, "chance"_a)
+      .def(
+          "__init__",
+          [](twin::Shutter* self, double period_s, double exposure_s, double latency_s, double jitter_s,
+             double drop_ratio, double t_first_s, double clock_start_s, double clock_rate, double most_sigmas,
+             const Words& chance) {
+            new (self) twin::Shutter({period_s, exposure_s, latency_s, jitter_s, drop_ratio, t_first_s,
+                                      clock_start_s, clock_rate, most_sigmas},
+                                     chance_of(chance));
+          },
+          "period_s"_a, "exposure_s"_a, "latency_s"_a, "jitter_s"_a, "drop_ratio"_a, "t_first_s"_a,
+          "clock_start_s"_a, "clock_rate"_a, "most_sigmas"_a, "chance"_a)
       .def("next", &exposed, "stalls"_a);
   // The order of `error`, as hil/data/localiser_error.toml names them.
-  m.attr("LOCALISER_ERROR") =
-      nb::make_tuple("not_seen_ratio", "outlier_ratio", "place_ratio", "sigma_xy_m",
-                     "sigma_theta_rad", "outlier_xy_m", "outlier_theta_rad");
+  m.attr("LOCALISER_ERROR") = nb::make_tuple("not_seen_ratio", "outlier_ratio", "place_ratio", "sigma_xy_m",
+                                             "sigma_theta_rad", "outlier_xy_m", "outlier_theta_rad");
   nb::class_<twin::DrawnPoses>(m, "DrawnPoses")
-      .def("__init__", [](twin::DrawnPoses* self, const std::array<double, 7>& error, bool swapped, double shift_m, const std::array<std::vector<std::array<double, 4>>, 3>& places, const Words& chance) {
-             std::array<std::vector<twin::Wave>, 3> waves;
-             for (std::size_t i = 0; i < 3; ++i) {
-               for (const auto& w : places[i]) waves[i].push_back({w[0], w[1], w[2], w[3]});
-             }
-             new (self) twin::DrawnPoses({error[0], error[1], error[2], error[3], error[4], error[5],
-                                          error[6], swapped, shift_m},
-                                         waves, chance_of(chance)); }, "error"_a, "swapped"_a, "shift_m"_a, "places"_a, "chance"_a)
+      .def(
+          "__init__",
+          [](twin::DrawnPoses* self, const std::array<double, 7>& error, bool swapped, double shift_m,
+             const std::array<std::vector<std::array<double, 4>>, 3>& places, const Words& chance) {
+            std::array<std::vector<twin::Wave>, 3> waves;
+            for (std::size_t i = 0; i < 3; ++i) {
+              for (const auto& w : places[i]) waves[i].push_back({w[0], w[1], w[2], w[3]});
+            }
+            new (self) twin::DrawnPoses(
+                {error[0], error[1], error[2], error[3], error[4], error[5], error[6], swapped, shift_m},
+                waves, chance_of(chance));
+          },
+          "error"_a, "swapped"_a, "shift_m"_a, "places"_a, "chance"_a)
       .def("measure", &measured, "x_m"_a, "y_m"_a, "theta_rad"_a);
 }
 
@@ -106,17 +124,25 @@ void bind_rig(nb::module_& m) {
   bind_parts(m);
   using twin::Rig;
   nb::class_<Rig>(m, "Rig")
-      .def("__init__", [](Rig* self, twin::Kernel& kernel, double start_s, int baud, const twin::Channel& down, const twin::Channel& up, const twin::Shutter& shutter, double readout_s) { new (self) Rig(kernel, {start_s, baud, readout_s}, down, up, shutter); }, nb::keep_alive<1, 2>(), "kernel"_a, "start_s"_a, "baud"_a, "down"_a, "up"_a, "shutter"_a, "readout_s"_a = 0.0)
+      .def(
+          "__init__",
+          [](Rig* self, twin::Kernel& kernel, double start_s, int baud, const twin::Channel& down,
+             const twin::Channel& up, const twin::Shutter& shutter,
+             double readout_s) { new (self) Rig(kernel, {start_s, baud, readout_s}, down, up, shutter); },
+          nb::keep_alive<1, 2>(), "kernel"_a, "start_s"_a, "baud"_a, "down"_a, "up"_a, "shutter"_a,
+          "readout_s"_a = 0.0)
       .def("set_spans", &Rig::set_spans, "stalls"_a, "hidden"_a)
       .def_prop_ro("down", &Rig::down, nb::rv_policy::reference_internal)
       .def_prop_ro("up", &Rig::up, nb::rv_policy::reference_internal)
-      .def("pose_at", [](const Rig& rig, double t_s) { return pose_tuple(rig.pose_at(t_s)); }, "t_s"_a)
+      .def(
+          "pose_at", [](const Rig& rig, double t_s) { return pose_tuple(rig.pose_at(t_s)); }, "t_s"_a)
       .def("now_s", &Rig::now_s)
       .def("wait", &Rig::wait, "until_s"_a, "poses"_a)
       .def("advance", &Rig::advance, "until_s"_a)
       .def("arrive", &Rig::arrive, "until_s"_a, "poses"_a)
       .def("read", [](Rig& rig) { return bytes_of(rig.read()); })
-      .def("send", [](Rig& rig, const nb::bytes& data) { rig.send(text(data)); }, "data"_a)
+      .def(
+          "send", [](Rig& rig, const nb::bytes& data) { rig.send(text(data)); }, "data"_a)
       .def("discard_unsent", &Rig::discard_unsent)
       .def("take_frame", &taken)
       .def("truth", &truth);

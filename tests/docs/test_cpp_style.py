@@ -26,10 +26,10 @@ def formatted(text: str, *options: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_style_is_the_projects() -> None:
-    """Two columns, pointers at the type, short functions on a line, lines broken as written."""
+    """Two columns, pointers at the type, short functions on a line, lines of up to 110 columns."""
     assert formatted(UGLY).stdout == "int f(int* a) { return *a; }\n"
     long = f"const int a = {' + '.join(['1'] * 60)};\n"
-    assert formatted(long).stdout == long
+    assert max(len(line) for line in formatted(long).stdout.splitlines()) <= 110
 
 
 def test_a_file_in_another_style_fails_the_check() -> None:

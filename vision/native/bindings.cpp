@@ -80,37 +80,66 @@ void bind_rims(nb::module_& m) {
       .def_ro("contrast_dn", &Disc::contrast_dn)
       .def_ro("ground_ratio", &Disc::ground_ratio);
   nb::class_<RimFitter>(m, "RimFitter")
-      .def("__init__", [](RimFitter* self, const Camera& camera, double radius_m, double height_m, const std::array<std::array<double, 3>, 2>& weights, const Point& middle_px) { new (self) RimFitter(camera, radius_m, height_m,
-                                                                                                                                                                                                       {colour(weights[0]), colour(weights[1])}, point(middle_px)); }, "camera"_a, "radius_m"_a, "height_m"_a, "weights"_a, "middle_px"_a)
-      .def("fit", [](const RimFitter& fitter, const Image& image, const std::array<Point, 2>& centres_m) -> std::optional<std::pair<Disc, Disc>> {
-             const auto discs =
-                 fitter.fit(view(image), {point(centres_m[0]), point(centres_m[1])});
-             if (!discs) {
-               return std::nullopt;
-             }
-             return std::pair((*discs)[0], (*discs)[1]); }, "image"_a, "centres_m"_a);
+      .def(
+          "__init__",
+          [](RimFitter* self, const Camera& camera, double radius_m, double height_m,
+             const std::array<std::array<double, 3>, 2>& weights, const Point& middle_px) {
+            new (self) RimFitter(camera, radius_m, height_m, {colour(weights[0]), colour(weights[1])},
+                                 point(middle_px));
+          },
+          "camera"_a, "radius_m"_a, "height_m"_a, "weights"_a, "middle_px"_a)
+      .def(
+          "fit",
+          [](const RimFitter& fitter, const Image& image,
+             const std::array<Point, 2>& centres_m) -> std::optional<std::pair<Disc, Disc>> {
+            const auto discs = fitter.fit(view(image), {point(centres_m[0]), point(centres_m[1])});
+            if (!discs) {
+              return std::nullopt;
+            }
+            return std::pair((*discs)[0], (*discs)[1]);
+          },
+          "image"_a, "centres_m"_a);
 }
 
 void bind_search(nb::module_& m) {
   nb::class_<MarkSearch>(m, "MarkSearch")
-      .def("__init__", [](MarkSearch* self, const Camera& camera, double radius_m, double height_m, double distance_m, const std::array<Point, 2>& hues) { new (self) MarkSearch(camera, radius_m, height_m, distance_m,
-                                                                                                                                                                                 {point(hues[0]), point(hues[1])}); }, "camera"_a, "radius_m"_a, "height_m"_a, "distance_m"_a, "hues"_a)
-      .def("places", [](const MarkSearch& search, const Image& image, const Point& origin_px, int shrink) {
-             const auto found = search.places(view(image), point(origin_px), shrink);
-             return std::pair(rows_of(found[0]), rows_of(found[1])); }, "image"_a, "origin_px"_a, "shrink"_a)
-      .def("pairs", [](const MarkSearch& search, const std::vector<Scored>& front, const std::vector<Scored>& rear) {
-             std::vector<std::pair<Point, Point>> rows;
-             for (const auto& [f, r] : search.pairs(places_of(front), places_of(rear))) {
-               rows.push_back({{f.x, f.y}, {r.x, r.y}});
-             }
-             return rows; }, "front"_a, "rear"_a);
+      .def(
+          "__init__",
+          [](MarkSearch* self, const Camera& camera, double radius_m, double height_m, double distance_m,
+             const std::array<Point, 2>& hues) {
+            new (self) MarkSearch(camera, radius_m, height_m, distance_m, {point(hues[0]), point(hues[1])});
+          },
+          "camera"_a, "radius_m"_a, "height_m"_a, "distance_m"_a, "hues"_a)
+      .def(
+          "places",
+          [](const MarkSearch& search, const Image& image, const Point& origin_px, int shrink) {
+            const auto found = search.places(view(image), point(origin_px), shrink);
+            return std::pair(rows_of(found[0]), rows_of(found[1]));
+          },
+          "image"_a, "origin_px"_a, "shrink"_a)
+      .def(
+          "pairs",
+          [](const MarkSearch& search, const std::vector<Scored>& front, const std::vector<Scored>& rear) {
+            std::vector<std::pair<Point, Point>> rows;
+            for (const auto& [f, r] : search.pairs(places_of(front), places_of(rear))) {
+              rows.push_back({{f.x, f.y}, {r.x, r.y}});
+            }
+            return rows;
+          },
+          "front"_a, "rear"_a);
 }
 
 }  // namespace
 
 NB_MODULE(_marks, m) {
   nb::class_<Camera>(m, "Camera")
-      .def("__init__", [](Camera* self, const std::array<double, 4>& lens, const std::array<double, 5>& distortion, const std::array<double, 9>& rotation, const std::array<double, 3>& centre_m) { new (self) Camera{lens, distortion, rotation, centre_m}; }, "lens"_a, "distortion"_a, "rotation"_a, "centre_m"_a);
+      .def(
+          "__init__",
+          [](Camera* self, const std::array<double, 4>& lens, const std::array<double, 5>& distortion,
+             const std::array<double, 9>& rotation, const std::array<double, 3>& centre_m) {
+            new (self) Camera{lens, distortion, rotation, centre_m};
+          },
+          "lens"_a, "distortion"_a, "rotation"_a, "centre_m"_a);
   bind_rims(m);
   bind_search(m);
 }

@@ -30,8 +30,8 @@ Vec2 Camera::project(Vec2 point_m, double z_m) const {
   if (!(zc > 0.0)) {
     return {kNaN, kNaN};
   }
-  const Vec2 d = distort({(r[0] * dx + r[3] * dy + r[6] * dz) / zc,
-                          (r[1] * dx + r[4] * dy + r[7] * dz) / zc});
+  const Vec2 d =
+      distort({(r[0] * dx + r[3] * dy + r[6] * dz) / zc, (r[1] * dx + r[4] * dy + r[7] * dz) / zc});
   return {lens[0] * d.x + lens[2], lens[1] * d.y + lens[3]};
 }
 

@@ -80,7 +80,8 @@ Rise rise(const Picture& picture, const std::array<Vec2, 2>& hues) {
   const int width = static_cast<int>(picture.width);
   const int height = static_cast<int>(picture.height);
   const std::size_t cells = static_cast<std::size_t>(width) * height;
-  Rise found{width, height, {std::vector<float>(cells), std::vector<float>(cells)}, std::vector<float>(cells)};
+  Rise found{
+      width, height, {std::vector<float>(cells), std::vector<float>(cells)}, std::vector<float>(cells)};
   const std::size_t padded = width + 2 * kReach;
   // The last kAboutPx + 1 rows in a ring: the one that leaves is there while the new one comes.
   constexpr int kRing = kAboutPx + 1;

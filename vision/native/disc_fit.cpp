@@ -69,8 +69,7 @@ Mask clear_of_cover(const Mask& usable) {
 }
 
 // (du, dv, growth) by least squares; none when too little of the rim is left.
-std::optional<Move> solved(const std::array<Move, kRays>& rows, const Round& shift,
-                           const Mask& keep) {
+std::optional<Move> solved(const std::array<Move, kRays>& rows, const Round& shift, const Mask& keep) {
   if (count(keep) < kRays / 6) {
     return std::nullopt;
   }
@@ -84,8 +83,7 @@ std::optional<Move> solved(const std::array<Move, kRays>& rows, const Round& shi
       right[i] += rows[ray][i] * shift[ray];
     }
   }
-  return Move{dot3((*covariance)[0], right), dot3((*covariance)[1], right),
-              dot3((*covariance)[2], right)};
+  return Move{dot3((*covariance)[0], right), dot3((*covariance)[1], right), dot3((*covariance)[2], right)};
 }
 
 // A robust standard deviation of kept residuals: 1.48 of their median.
@@ -102,8 +100,8 @@ double spread(const Round& rest, const Mask& keep) {
 }
 
 // (du, dv, growth) without the rays far off the fit, which leave `keep`; `tries` times to find them.
-std::optional<Move> robust(const std::array<Move, kRays>& rows, const Round& shift,
-                           const Mask& usable, int tries, Mask& keep) {
+std::optional<Move> robust(const std::array<Move, kRays>& rows, const Round& shift, const Mask& usable,
+                           int tries, Mask& keep) {
   for (int i = 0; i < tries; ++i) {
     const std::optional<Move> move = solved(rows, shift, keep);
     if (!move) {
@@ -182,11 +180,7 @@ void claim(Disc& disc, double variance) {
 
 RimFitter::RimFitter(const Camera& camera, double radius_m, double height_m,
                      const std::array<Colour, 2>& weights, Vec2 middle_px)
-    : camera_(camera),
-      radius_m_(radius_m),
-      height_m_(height_m),
-      weights_(weights),
-      profiles_(1.0) {
+    : camera_(camera), radius_m_(radius_m), height_m_(height_m), weights_(weights), profiles_(1.0) {
   for (int ray = 0; ray < kRays; ++ray) {
     const double angle = kTurn * ray / kRays;
     circle_m_[ray] = {radius_m_ * std::cos(angle), radius_m_ * std::sin(angle)};
@@ -221,8 +215,7 @@ std::optional<RimFitter::Shape> RimFitter::shape(Vec2 px) const {
   return found;
 }
 
-std::optional<Vec2> RimFitter::centred(const Picture& picture, Vec2 px,
-                                       const Colour& weights) const {
+std::optional<Vec2> RimFitter::centred(const Picture& picture, Vec2 px, const Colour& weights) const {
   const std::optional<Shape> rim = shape(px);
   if (!rim) {
     return std::nullopt;
@@ -256,8 +249,8 @@ Mask RimFitter::within(const Picture& picture, Vec2 px, const Shape& shape) cons
   const double reach = shape.step_px * profiles_.half();
   for (int ray = 0; ray < kRays; ++ray) {
     const Vec2 at = px + shape.arms[ray];
-    seen[ray] = picture.holds(at + reach * shape.normals[ray]) &&
-                picture.holds(at - reach * shape.normals[ray]);
+    seen[ray] =
+        picture.holds(at + reach * shape.normals[ray]) && picture.holds(at - reach * shape.normals[ray]);
   }
   return seen;
 }
@@ -302,8 +295,7 @@ bool RimFitter::step(const Picture& picture, Vec2 px, const Colour& weights, con
   for (int ray = 0; keep != nullptr && ray < kRays; ++ray) {
     done.keep[ray] = whole[ray] && (*keep)[ray];
   }
-  const std::optional<Move> move =
-      robust(done.rows, done.shift, whole, keep == nullptr ? 2 : 1, done.keep);
+  const std::optional<Move> move = robust(done.rows, done.shift, whole, keep == nullptr ? 2 : 1, done.keep);
   if (move) {
     done.move = *move;
   }
@@ -386,8 +378,7 @@ std::optional<std::array<Disc, 2>> RimFitter::fit(const Picture& picture,
     all_rays = far_px > kRekeepPx;
   }
   std::array<double, 2> variance;
-  std::array<Disc, 2> discs = {disc(picture, steps[0], variance[0]),
-                               disc(picture, steps[1], variance[1])};
+  std::array<Disc, 2> discs = {disc(picture, steps[0], variance[0]), disc(picture, steps[1], variance[1])};
   const double shared = 0.5 * (variance[0] + variance[1]);
   for (int k = 0; k < 2; ++k) {
     claim(discs[k], std::max(variance[k], 0.5 * (variance[k] + shared)));

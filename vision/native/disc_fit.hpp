@@ -12,7 +12,6 @@
 
 namespace vision {
 
-
 // One fitted disc. (u, v) is the image of its centre, `growth` its radius over the known one less 1,
 // `share` the part of its rim that was seen, `residual_px` the RMS of those edges, the covariance
 // that of (u, v), `ground_ratio` the brightness beside it over its own.
@@ -24,13 +23,12 @@ struct Disc {
 
 class RimFitter {
  public:
-  RimFitter(const Camera& camera, double radius_m, double height_m,
-            const std::array<Colour, 2>& weights, Vec2 middle_px);
+  RimFitter(const Camera& camera, double radius_m, double height_m, const std::array<Colour, 2>& weights,
+            Vec2 middle_px);
 
   // Both discs from guesses of their centres, m on their plane, off by half of the radius at most;
   // none where a disc is out of view or has no edge.
-  std::optional<std::array<Disc, 2>> fit(const Picture& picture,
-                                         const std::array<Vec2, 2>& centres_m) const;
+  std::optional<std::array<Disc, 2>> fit(const Picture& picture, const std::array<Vec2, 2>& centres_m) const;
 
  private:
   // The rim seen about a pixel: arms from the image of its centre, and normals outwards.
@@ -53,8 +51,7 @@ class RimFitter {
 
   std::optional<Shape> shape(Vec2 px) const;
   std::optional<Vec2> centred(const Picture& picture, Vec2 px, const Colour& weights) const;
-  bool step(const Picture& picture, Vec2 px, const Colour& weights, const Mask* keep,
-            Step& done) const;
+  bool step(const Picture& picture, Vec2 px, const Colour& weights, const Mask* keep, Step& done) const;
   Mask within(const Picture& picture, Vec2 px, const Shape& shape) const;
   // The figures of a fitted disc, its covariance for a noise of 1 px; `variance` is the noise's.
   Disc disc(const Picture& picture, const Step& step, double& variance) const;

@@ -27,8 +27,7 @@ struct Picture {
 
   Colour at(std::ptrdiff_t u, std::ptrdiff_t v) const {
     const std::uint8_t* p = data + v * row + u * pixel;
-    return {static_cast<float>(p[0]), static_cast<float>(p[channel]),
-            static_cast<float>(p[2 * channel])};
+    return {static_cast<float>(p[0]), static_cast<float>(p[channel]), static_cast<float>(p[2 * channel])};
   }
 
   bool holds(Vec2 px) const {

@@ -58,8 +58,8 @@ struct Swing {
 };
 
 // How far between its two levels the mean of each profile is: -1 all outside, 1 all inside.
-Swing swing(const std::vector<float>& response, const std::vector<double>& sums, int samples,
-            int middle, int edge, int level) {
+Swing swing(const std::vector<float>& response, const std::vector<double>& sums, int samples, int middle,
+            int edge, int level) {
   Round inner, outer, between;
   for (int ray = 0; ray < kRays; ++ray) {
     const double* s = &sums[ray * (samples + 1)];
@@ -160,8 +160,7 @@ Edges Profiles::edges(const std::vector<float>& response) const {
   const double least = std::max(kStepShare * found.typical_dn, kResponseMinDn);
   for (int ray = 0; ray < kRays; ++ray) {
     const double room = kShiftShare * edge_[best[ray]];
-    found.usable[ray] =
-        std::min(step[ray], inner[ray]) > least && std::abs(found.shift[ray]) < room;
+    found.usable[ray] = std::min(step[ray], inner[ray]) > least && std::abs(found.shift[ray]) < room;
   }
   return found;
 }

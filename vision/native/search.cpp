@@ -69,11 +69,7 @@ bool is_round(const std::vector<float>& rise, int width, int height, int u, int 
 
 MarkSearch::MarkSearch(const Camera& camera, double radius_m, double height_m, double distance_m,
                        const std::array<Vec2, 2>& hues)
-    : camera_(camera),
-      radius_m_(radius_m),
-      height_m_(height_m),
-      distance_m_(distance_m),
-      hues_(hues) {
+    : camera_(camera), radius_m_(radius_m), height_m_(height_m), distance_m_(distance_m), hues_(hues) {
   const double first = std::sqrt(0.5);
   const double second = std::sqrt(1.0 / 6.0);
   for (int k = 0; k < 2; ++k) {
@@ -102,9 +98,8 @@ Colour MarkSearch::Look::at(const Spot& spot, Vec2 point) const {
   const Vec2 px = spot.px + point.x * spot.along + point.y * spot.across;
   const double u = std::nearbyint((px.x - origin_px.x) / shrink);
   const double v = std::nearbyint((px.y - origin_px.y) / shrink);
-  return picture.at(
-      static_cast<std::ptrdiff_t>(std::clamp(u, 0.0, static_cast<double>(picture.width - 1))),
-      static_cast<std::ptrdiff_t>(std::clamp(v, 0.0, static_cast<double>(picture.height - 1))));
+  return picture.at(static_cast<std::ptrdiff_t>(std::clamp(u, 0.0, static_cast<double>(picture.width - 1))),
+                    static_cast<std::ptrdiff_t>(std::clamp(v, 0.0, static_cast<double>(picture.height - 1))));
 }
 
 std::array<std::vector<MarkSearch::Peak>, 2> MarkSearch::peaks(const Picture& picture) const {
@@ -200,8 +195,7 @@ std::optional<double> MarkSearch::loss(const Look& look, const Colour& weights, 
          kHueLoss * (1.0 - static_cast<double>(cosine));
 }
 
-std::array<Places, 2> MarkSearch::places(const Picture& picture, Vec2 origin_px,
-                                         int shrink) const {
+std::array<Places, 2> MarkSearch::places(const Picture& picture, Vec2 origin_px, int shrink) const {
   const std::array<std::vector<Peak>, 2> all = peaks(picture);
   const Look look{picture, origin_px, shrink};
   std::array<Places, 2> found;
@@ -245,8 +239,7 @@ std::vector<Pair> MarkSearch::pairs(const Places& front, const Places& rear) con
       }
     }
   }
-  std::stable_sort(all.begin(), all.end(),
-                   [](const Scored& a, const Scored& b) { return a.loss < b.loss; });
+  std::stable_sort(all.begin(), all.end(), [](const Scored& a, const Scored& b) { return a.loss < b.loss; });
   std::vector<Pair> best;
   for (std::size_t i = 0; i < std::min(all.size(), kPairsMax); ++i) {
     best.push_back(all[i].pair);

@@ -57,8 +57,7 @@ class MarkSearch {
   Spot spot(Vec2 px) const;
   void centre(const Look& look, const Colour& weights, Spot& spot) const;
   // What a place loses; none where it cannot be a mark.
-  std::optional<double> loss(const Look& look, const Colour& weights, const Spot& spot,
-                             float cosine) const;
+  std::optional<double> loss(const Look& look, const Colour& weights, const Spot& spot, float cosine) const;
 
   Camera camera_;
   double radius_m_, height_m_, distance_m_;

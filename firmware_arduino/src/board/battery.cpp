@@ -13,8 +13,8 @@ uint16_t g_mv;
 }  // namespace
 
 void start() {
-  DIDR0 |= _BV(pins::kBatteryAdc);           // no digital input on an analog pin
-  ADMUX = _BV(REFS0) | pins::kBatteryAdc;    // against the 5 V supply
+  DIDR0 |= _BV(pins::kBatteryAdc);         // no digital input on an analog pin
+  ADMUX = _BV(REFS0) | pins::kBatteryAdc;  // against the 5 V supply
   ADCSRB = 0;
   ADCSRA = _BV(ADEN) | _BV(ADSC) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0);  // clk/128 = 125 kHz
 }

@@ -27,9 +27,7 @@ uint8_t g_left_illegal, g_right_illegal;  // the same for illegal transitions
 static_assert(pins::kLeftEncoderB == 0 && pins::kLeftEncoderA == 1, "left_ab() takes bits 0, 1");
 static_assert(pins::kRightEncoderB == 4 && pins::kRightEncoderA == 5, "right_ab() takes bits 4, 5");
 
-inline uint8_t left_ab() {
-  return PIND & 3;
-}
+inline uint8_t left_ab() { return PIND & 3; }
 
 inline uint8_t right_ab() {
   return __builtin_avr_swap(PINE) & 3;  // a shift by four is a loop here
@@ -51,7 +49,7 @@ void start() {
   // Pull-ups suit open-collector encoders and do no harm to driven ones.
   PORTD |= _BV(pins::kLeftEncoderA) | _BV(pins::kLeftEncoderB);
   PORTE |= _BV(pins::kRightEncoderA) | _BV(pins::kRightEncoderB);
-  _delay_us(10);  // for the pull-ups to charge the leads before the first look
+  _delay_us(10);                    // for the pull-ups to charge the leads before the first look
   EICRA = _BV(ISC00) | _BV(ISC10);  // any edge
   EICRB = _BV(ISC40) | _BV(ISC50);
   g_left.last_ab = left_ab();

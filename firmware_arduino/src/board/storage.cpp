@@ -12,9 +12,7 @@ void read(void*, uint16_t address, uint8_t* out, uint16_t n) { eeprom_read_block
 
 }  // namespace
 
-void load(Board& board) {
-  board_load(board, read, nullptr);
-}
+void load(Board& board) { board_load(board, read, nullptr); }
 
 void tick(Board& board) {
   StoredByte byte;

@@ -15,8 +15,8 @@ namespace hil {
 
 // One snapshot, taken at t_us with interrupts off.
 struct BoardInputs {
-  uint32_t t_us;            // board clock, wraps
-  int32_t counts_left;      // rise when the wheel drives forward
+  uint32_t t_us;        // board clock, wraps
+  int32_t counts_left;  // rise when the wheel drives forward
   int32_t counts_right;
   uint16_t encoder_faults;  // illegal transitions of both encoders since start, wraps
   uint16_t battery_mv;
@@ -46,13 +46,13 @@ struct Board {
   Wheel wheel[SIDES];
   Setpoint setpoint;
   Link link;
-  BoardInputs inputs;      // of the last tick
-  bool ticked;             // a tick has been, so `inputs` and the encoder zero are real
-  uint8_t slot;            // place in the one-second schedule of reports, in ticks
-  uint8_t params_next;     // next parameter of a running list; PARAM_COUNT: none
+  BoardInputs inputs;   // of the last tick
+  bool ticked;          // a tick has been, so `inputs` and the encoder zero are real
+  uint8_t slot;         // place in the one-second schedule of reports, in ticks
+  uint8_t params_next;  // next parameter of a running list; PARAM_COUNT: none
   uint8_t texts_waiting[TEXT_BYTES];
   uint8_t texts_sent[TEXT_BYTES];  // in this second
-  uint32_t default_hash;   // parameter hash of the defaults
+  uint32_t default_hash;           // parameter hash of the defaults
   Save save;
   bool retune_due;         // parameters have changed and `tuning` and `limits` have not
   uint8_t retune_wait;     // ticks until it may be worked out while armed

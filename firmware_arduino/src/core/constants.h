@@ -6,8 +6,8 @@
 
 namespace hil {
 
-constexpr int16_t PWM_TOP = 400;     // 20 kHz phase-correct PWM from a 16 MHz timer
-constexpr uint16_t TICK_US = 4000;   // 250 Hz
+constexpr int16_t PWM_TOP = 400;    // 20 kHz phase-correct PWM from a 16 MHz timer
+constexpr uint16_t TICK_US = 4000;  // 250 Hz
 constexpr float TICK_S = 0.004f;
 // The encoder interrupt tallies a tick's counts in one byte: 127 of them at most.
 constexpr float ENCODER_COUNTS_1_S = 127.0f / TICK_S;

@@ -21,8 +21,7 @@ void link_init(Link& link) { memset(&link, 0, sizeof(link)); }
 
 bool link_take(Link& link, uint8_t byte) {
   const uint8_t overruns = link.status.buffer_overrun;
-  const uint8_t got =
-      mavlink_frame_char_buffer(&link.rx, &link.status, byte, nullptr, nullptr);
+  const uint8_t got = mavlink_frame_char_buffer(&link.rx, &link.status, byte, nullptr, nullptr);
   if (got == MAVLINK_FRAMING_OK) {
     count_frame(link);
     return true;

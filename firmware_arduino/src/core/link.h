@@ -16,11 +16,11 @@ struct Link {
   mavlink_message_t rx;
   mavlink_status_t status;  // parser state and the sequence number of frames sent
   Ring tx;
-  bool heard;               // a frame has come in, so gaps in its sequence mean losses
+  bool heard;  // a frame has come in, so gaps in its sequence mean losses
   uint8_t next_seq;
-  uint32_t received;        // wraps after years
+  uint32_t received;  // wraps after years
   uint32_t lost;
-  uint16_t bad;             // these two stay at their largest value
+  uint16_t bad;  // these two stay at their largest value
   uint16_t dropped;
 };
 

@@ -20,8 +20,7 @@ constexpr uint32_t after_name(uint32_t state, const char (&name)[N], uint8_t fro
                           static_cast<uint8_t>(from + 1));
 }
 
-#define HIL_SPEC(name, value, low, high, live) \
-  {name, value, low, high, live, ~after_name(0xFFFFFFFFu, name)},
+#define HIL_SPEC(name, value, low, high, live) {name, value, low, high, live, ~after_name(0xFFFFFFFFu, name)},
 constexpr ParamSpec SPECS[PARAM_COUNT] HIL_FLASH = {
 #define PARAM(name, field, value, low, high, unit, doc) HIL_SPEC(name, value, low, high, 0)
 #define LIVE_PARAM(name, field, value, low, high, unit, doc) HIL_SPEC(name, value, low, high, 1)
@@ -41,8 +40,9 @@ bool in_range(const ParamSpec& spec, float value) {
 }
 
 constexpr uint32_t after_names(uint32_t state, uint8_t from = 0) {
-  return from == PARAM_COUNT ? state : after_names(after_name(state, SPECS[from].name),
-                                                   static_cast<uint8_t>(from + 1));
+  return from == PARAM_COUNT
+             ? state
+             : after_names(after_name(state, SPECS[from].name), static_cast<uint8_t>(from + 1));
 }
 constexpr uint32_t NAMES_HASH = ~after_names(0xFFFFFFFFu);
 

@@ -10,8 +10,7 @@ namespace hil {
 namespace {
 
 bool is_for_us(uint8_t system, uint8_t component) {
-  return (system == 0 || system == BOARD_SYSTEM_ID) &&
-         (component == 0 || component == BOARD_COMPONENT_ID);
+  return (system == 0 || system == BOARD_SYSTEM_ID) && (component == 0 || component == BOARD_COMPONENT_ID);
 }
 
 // A retune while armed starts the wheel law anew, so there are ten a second at most.
@@ -224,8 +223,7 @@ void protocol_retune(Board& b) {
 void protocol_acknowledge(Board& b, uint16_t command, uint8_t result) {
   mavlink_command_ack_t m = {command, result};
   mavlink_message_t message;
-  mavlink_msg_command_ack_encode_status(BOARD_SYSTEM_ID, BOARD_COMPONENT_ID, &b.link.status, &message,
-                                        &m);
+  mavlink_msg_command_ack_encode_status(BOARD_SYSTEM_ID, BOARD_COMPONENT_ID, &b.link.status, &message, &m);
   link_send(b.link, message, WHEEL_STATE_ROOM);
 }
 

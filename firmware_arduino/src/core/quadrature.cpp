@@ -3,10 +3,22 @@
 namespace hil {
 
 const int8_t QUADRATURE_STEP[16] = {
-    0,  -1, +1, QUADRATURE_ILLEGAL,   // from 00
-    +1, 0,  QUADRATURE_ILLEGAL, -1,   // from 01
-    -1, QUADRATURE_ILLEGAL, 0,  +1,   // from 10
-    QUADRATURE_ILLEGAL, +1, -1, 0,    // from 11
+    0,
+    -1,
+    +1,
+    QUADRATURE_ILLEGAL,  // from 00
+    +1,
+    0,
+    QUADRATURE_ILLEGAL,
+    -1,  // from 01
+    -1,
+    QUADRATURE_ILLEGAL,
+    0,
+    +1,  // from 10
+    QUADRATURE_ILLEGAL,
+    +1,
+    -1,
+    0,  // from 11
 };
 
 void quadrature_update(Quadrature& q, uint8_t ab) {

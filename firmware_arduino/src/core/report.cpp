@@ -33,12 +33,12 @@ static_assert(static_cast<uint8_t>(Text::COUNT) <= 8 * TEXT_BYTES, "one bit per 
 static_assert(sizeof(HIL_BUILD_ID) <= 9, "eight characters of build id");
 
 // Packs a message of the dialect and queues it behind room for a wheel state.
-#define HIL_SEND(b, name, fields)                                                              \
-  do {                                                                                         \
-    mavlink_message_t message;                                                                 \
-    mavlink_msg_##name##_encode_status(BOARD_SYSTEM_ID, BOARD_COMPONENT_ID, &(b).link.status,  \
-                                       &message, &(fields));                                   \
-    link_send((b).link, message, WHEEL_STATE_ROOM);                                            \
+#define HIL_SEND(b, name, fields)                                                                       \
+  do {                                                                                                  \
+    mavlink_message_t message;                                                                          \
+    mavlink_msg_##name##_encode_status(BOARD_SYSTEM_ID, BOARD_COMPONENT_ID, &(b).link.status, &message, \
+                                       &(fields));                                                      \
+    link_send((b).link, message, WHEEL_STATE_ROOM);                                                     \
   } while (false)
 
 uint8_t wheel_flags(const Board& b) {
@@ -73,8 +73,7 @@ void send_wheel_state(Board& b) {
   m.reason = b.safety.reason;
   m.flags = wheel_flags(b);
   mavlink_message_t message;
-  mavlink_msg_wheel_state_encode_status(BOARD_SYSTEM_ID, BOARD_COMPONENT_ID, &b.link.status, &message,
-                                        &m);
+  mavlink_msg_wheel_state_encode_status(BOARD_SYSTEM_ID, BOARD_COMPONENT_ID, &b.link.status, &message, &m);
   link_send(b.link, message, 0);
 }
 
@@ -112,9 +111,7 @@ uint16_t loss_share(const Link& link) {
   return static_cast<uint16_t>(10000u * lost / all);
 }
 
-uint16_t in_16_bits(uint32_t count) {
-  return count < UINT16_MAX ? static_cast<uint16_t>(count) : UINT16_MAX;
-}
+uint16_t in_16_bits(uint32_t count) { return count < UINT16_MAX ? static_cast<uint16_t>(count) : UINT16_MAX; }
 
 }  // namespace
 

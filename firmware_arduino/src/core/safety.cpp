@@ -60,8 +60,8 @@ bool runs_away(Tally& t, const SideView& v, const SafetyLimits& limits) {
   const bool pushed = v.pwm >= limits.runaway_pwm || v.pwm <= -limits.runaway_pwm;
   fade(t);
   if (pushed && v.moved_counts == 0) return false;
-  const bool lost = pushed && against(v) &&
-                    fabsf(v.omega_rad_s - v.setpoint_rad_s) >= limits.runaway_error_rad_s;
+  const bool lost =
+      pushed && against(v) && fabsf(v.omega_rad_s - v.setpoint_rad_s) >= limits.runaway_error_rad_s;
   return adds_up(t, lost, limits.runaway_ticks, limits.runaway_ticks / 3);
 }
 
@@ -135,7 +135,8 @@ SafetyLimits safety_limits(const Params& p) {
   l.setpoint_age_us = static_cast<uint32_t>(p.setpoint_timeout_ms * 1000.0f) - TICK_US;
   l.battery_low_mv = static_cast<uint16_t>(p.battery_low_v * 1000.0f + 0.5f);
   l.battery_good_mv = p.battery_low_v > 0.0f
-      ? static_cast<uint16_t>((p.battery_low_v + p.battery_hysteresis_v) * 1000.0f + 0.5f) : 0;
+                          ? static_cast<uint16_t>((p.battery_low_v + p.battery_hysteresis_v) * 1000.0f + 0.5f)
+                          : 0;
   l.battery_ticks = ticks_of(p.battery_debounce_ms);
   l.stall_ticks = ticks_of(p.stall_ms);
   l.pause_ticks = static_cast<uint16_t>(pause_ticks(p));

@@ -32,13 +32,13 @@ struct SafetyLimits {
   uint32_t setpoint_age_us;  // beyond this the time-out would pass before the next tick
   uint16_t battery_low_mv, battery_good_mv, battery_ticks;
   uint16_t stall_ticks, runaway_ticks, overspeed_ticks;
-  uint16_t pause_ticks;      // from here on a wheel that stood while it was driven is remembered
+  uint16_t pause_ticks;  // from here on a wheel that stood while it was driven is remembered
   int16_t stall_pwm, runaway_pwm;
   float stall_setpoint_rad_s;
   float runaway_error_rad_s;
   float overspeed_rad_s;
   uint16_t illegal_per_s;
-  bool edges_too_fast;       // at OVER_W more counts a tick than the encoder's tally holds
+  bool edges_too_fast;  // at OVER_W more counts a tick than the encoder's tally holds
 };
 SafetyLimits safety_limits(const Params& params);
 

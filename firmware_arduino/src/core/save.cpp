@@ -29,8 +29,8 @@ Stored save_load(Save& s, Params& params, StorageRead read, void* storage) {
   const bool any = first == ImageResult::LOADED || second == ImageResult::LOADED;
   const bool damaged = first == ImageResult::DAMAGED || second == ImageResult::DAMAGED;
   if (!any) return {damaged ? ImageResult::DAMAGED : ImageResult::BLANK, false};
-  const bool use_second = both ? is_newer(image_serial(s.image), first_serial)
-                               : second == ImageResult::LOADED;
+  const bool use_second =
+      both ? is_newer(image_serial(s.image), first_serial) : second == ImageResult::LOADED;
   if (!use_second) read_slot(s, params, 0, read, storage);
   s.serial = image_serial(s.image);
   s.slot = use_second ? 0 : 1;

@@ -21,12 +21,12 @@ struct StoredByte {
 
 struct Save {
   uint8_t image[IMAGE_SIZE];
-  uint32_t crc;     // over what has been handed out
-  uint16_t next;    // byte to hand out
-  uint8_t slot;     // that the next save goes to, or this one does
-  uint8_t serial;   // of the image in force
+  uint32_t crc;    // over what has been handed out
+  uint16_t next;   // byte to hand out
+  uint8_t slot;    // that the next save goes to, or this one does
+  uint8_t serial;  // of the image in force
   bool running;
-  bool wanted;      // a save is to begin when none is running
+  bool wanted;  // a save is to begin when none is running
 };
 
 // Copies n bytes of the storage from `address` on; `storage` is the caller's.

@@ -61,8 +61,7 @@ void vary_gain(SuperTwisting& st, const SuperTwistingGains& g, float sign) {
 
 }  // namespace
 
-SuperTwistingGains super_twisting_gains(Scheme scheme, float l, float l0, float l1, float cell,
-                                        float dt_s) {
+SuperTwistingGains super_twisting_gains(Scheme scheme, float l, float l0, float l1, float cell, float dt_s) {
   SuperTwistingGains g;
   g.scheme = scheme;
   g.variable = false;

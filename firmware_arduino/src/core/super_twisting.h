@@ -13,8 +13,8 @@ struct SuperTwistingSteps {
   float root;     // dt l1 sqrt(L): weight of |e|^(1/2) in x1
   float root_sq;  // its square
   float half_root, quarter_root_sq;
-  float sign;     // dt^2 l0 L: what the sign term does to x1 through x2 in one step
-  float slope;    // dt l0 L: what the sign term takes off x2
+  float sign;   // dt^2 l0 L: what the sign term does to x1 through x2 in one step
+  float slope;  // dt l0 L: what the sign term takes off x2
 };
 
 struct SuperTwistingGains {
@@ -25,13 +25,12 @@ struct SuperTwistingGains {
   float cell;   // half width of the measurement's quantisation cell, units of x
   float l_max;  // units of x per s^2
   float l_min;
-  float grow;   // dt rho_k
-  float alpha;  // equivalent sign above which L grows
+  float grow;                // dt rho_k
+  float alpha;               // equivalent sign above which L grows
   SuperTwistingSteps steps;  // for l_max
 };
 
-SuperTwistingGains super_twisting_gains(Scheme scheme, float l, float l0, float l1, float cell,
-                                        float dt_s);
+SuperTwistingGains super_twisting_gains(Scheme scheme, float l, float l0, float l1, float cell, float dt_s);
 // Lets L move between l_min and the l given above at the rate rho (3.15).
 void super_twisting_vary(SuperTwistingGains& gains, float l_min, float rho_1_s, float alpha);
 

@@ -95,8 +95,7 @@ float step(State& sl, const Tuning& t, const Tracked& w) {
   }
   if (w.fresh) sl.bound = t.gamma0 + t.gamma1 * fabsf(w.demand.setpoint_rad_s);
   const float xa = derivative ? w.error_rad_s : sl.integral;
-  const float push =
-      sliding_control(sl, t, xb, xa, sl.bound + t.gamma2 * fabsf(w.omega_rad_s));
+  const float push = sliding_control(sl, t, xb, xa, sl.bound + t.gamma2 * fabsf(w.omega_rad_s));
   pass_time(sl, t);
   if (may_integrate(w, w.error_rad_s)) sl.integral += TICK_S * w.error_rad_s;
   // |Psi| <= sigma: by itself while mu falls, by the limit once it stands.

@@ -12,18 +12,18 @@ enum class Form : uint8_t { INTEGRAL = 0, DERIVATIVE = 1 };
 struct Tuning {
   Form form;
   float sigma, sigma_tick, average_max, mu0_s, mu_start, eps0, eps_min;
-  float mu_hold_s;         // value of t + mu0 at which mu stops falling
-  float eps_until_s;       // value of t + mu0 from which eps(t) is at its floor
+  float mu_hold_s;    // value of t + mu0 at which mu stops falling
+  float eps_until_s;  // value of t + mu0 from which eps(t) is at its floor
   float two_g, two_k0, gamma0, gamma1, gamma2, step_rad_s;
 };
 
 // Sliding variable and the terms it is made of.
 struct State {
-  float t_mu0_s;          // t + mu0; t restarts at arming and when the set-point steps
-  float mu;               // 1 / (t + mu0)
-  float integral;         // E, integral of e (the integral form)
-  float average;          // sigma * integral of sgn(xa)
-  float eta;              // makes s(0) = 0
+  float t_mu0_s;   // t + mu0; t restarts at arming and when the set-point steps
+  float mu;        // 1 / (t + mu0)
+  float integral;  // E, integral of e (the integral form)
+  float average;   // sigma * integral of sgn(xa)
+  float eta;       // makes s(0) = 0
   float s;
   float eps;              // boundary layer in force
   float gain;             // k(t), duty (duty/s in the derivative form)

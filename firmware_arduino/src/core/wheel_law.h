@@ -28,14 +28,14 @@ struct Demand {
 
 // One side's wheels as a law sees them.
 struct Tracked {
-  float omega_rad_s;          // low-passed estimate
+  float omega_rad_s;  // low-passed estimate
   Demand demand;
-  float error_rad_s;          // e = omega - omega*
-  float error_lag_rad_s;      // low-passed e
-  float error_rate_rad_s2;    // filtered derivative of e
-  int8_t saturation;          // +1: held below what is wanted, -1: above, 0: free
-  Start start;                // of the next tick
-  bool fresh;                 // the set-point is new in this tick
+  float error_rad_s;        // e = omega - omega*
+  float error_lag_rad_s;    // low-passed e
+  float error_rate_rad_s2;  // filtered derivative of e
+  int8_t saturation;        // +1: held below what is wanted, -1: above, 0: free
+  Start start;              // of the next tick
+  bool fresh;               // the set-point is new in this tick
 };
 
 // The laws fall as their integrals grow, so growth in the direction of `push` would drive the output

@@ -35,8 +35,7 @@ void track_error(Wheel& w, const WheelTuning& t) {
 float law_step(Wheel& w, const WheelTuning& t) {
   switch (t.law) {
 #define WHEEL_LAW(ID, files, name, doc) \
-  case Law::ID:                         \
-    return wheel_##files::step(w.files, t.files, w);
+  case Law::ID: return wheel_##files::step(w.files, t.files, w);
 #include "laws.def"
 #undef WHEEL_LAW
   }
@@ -46,8 +45,7 @@ float law_step(Wheel& w, const WheelTuning& t) {
 bool law_stepped(const Wheel& w, const WheelTuning& t, float setpoint_rad_s) {
   switch (t.law) {
 #define WHEEL_LAW(ID, files, name, doc) \
-  case Law::ID:                         \
-    return wheel_##files::stepped(w.files, t.files, setpoint_rad_s);
+  case Law::ID: return wheel_##files::stepped(w.files, t.files, setpoint_rad_s);
 #include "laws.def"
 #undef WHEEL_LAW
   }
@@ -79,8 +77,8 @@ float transfer(const Wheel& w, float law) {
 WheelTuning wheel_tuning(const Params& p) {
   WheelTuning t;
   t.rad_per_count = TWO_PI_RAD / p.enc_counts_per_turn;
-  t.st = super_twisting_gains(static_cast<Scheme>(static_cast<uint8_t>(p.st_scheme)), p.st_l_rad_s2,
-                              p.st_l0, p.st_l1, p.st_cell_counts * t.rad_per_count, TICK_S);
+  t.st = super_twisting_gains(static_cast<Scheme>(static_cast<uint8_t>(p.st_scheme)), p.st_l_rad_s2, p.st_l0,
+                              p.st_l1, p.st_cell_counts * t.rad_per_count, TICK_S);
   if (p.st_variable >= 1.0f) {
     super_twisting_vary(t.st, p.st_l_min_rad_s2, p.st_rho_1_s, p.st_alpha);
   }
@@ -112,8 +110,8 @@ void wheel_init(Wheel& w, const WheelTuning& t, int32_t counts) {
 
 void wheel_estimate(Wheel& w, const WheelTuning& t, int32_t counts) {
   // Through unsigned: the difference stays right when the counter wraps.
-  const int32_t moved = static_cast<int32_t>(static_cast<uint32_t>(counts) -
-                                             static_cast<uint32_t>(w.last_counts));
+  const int32_t moved =
+      static_cast<int32_t>(static_cast<uint32_t>(counts) - static_cast<uint32_t>(w.last_counts));
   w.last_counts = counts;
   const float raw = super_twisting_step(w.st, t.st, static_cast<float>(moved) * t.rad_per_count);
   w.omega_rad_s += t.omega_blend * (raw - w.omega_rad_s);
@@ -155,8 +153,7 @@ void wheel_limit(Wheel& w, const WheelTuning& t) {
 float wheel_sliding(const Wheel& w, const WheelTuning& t) {
   switch (t.law) {
 #define WHEEL_LAW(ID, files, name, doc) \
-  case Law::ID:                         \
-    return wheel_##files::sliding(w.files);
+  case Law::ID: return wheel_##files::sliding(w.files);
 #include "laws.def"
 #undef WHEEL_LAW
   }

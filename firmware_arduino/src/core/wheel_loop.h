@@ -14,7 +14,7 @@ namespace hil {
 struct WheelTuning {
   SuperTwistingGains st;
   float rad_per_count;
-  float omega_blend;       // share of a new value the speed filter takes per tick
+  float omega_blend;  // share of a new value the speed filter takes per tick
   float error_rate_blend;
   float inv_error_rate_tau_1_s;
   float ff_duty_s_rad, ff_dead_duty, ff_inv_dead_s_rad;
@@ -23,7 +23,7 @@ struct WheelTuning {
 #define WHEEL_LAW(ID, files, name, doc) wheel_##files::Tuning files;
 #include "laws.def"
 #undef WHEEL_LAW
-  float bump_keep;         // share of the transfer offset left after one tick
+  float bump_keep;  // share of the transfer offset left after one tick
   int16_t pwm_max_counts, slew_counts;
 };
 

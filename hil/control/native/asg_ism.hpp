@@ -22,9 +22,9 @@ namespace control {
 
 struct AsgGains {
   int n = 1;
-  Vec k{};         // gain of the sliding term; one value in every entry unless componentwise
-  Vec eps_min{};   // floor of the layer
-  Vec kd{};        // extra damping on q, as table 4.3 has it
+  Vec k{};        // gain of the sliding term; one value in every entry unless componentwise
+  Vec eps_min{};  // floor of the layer
+  Vec kd{};       // extra damping on q, as table 4.3 has it
   double eps0 = 0.0, beta = 0.5;
   double mu0 = 1.0, mu_min = 0.0;
   double sigma = 1.0;  // scale of the cost H = sigma sum |p_i|
@@ -83,10 +83,10 @@ class AsgIsm : public Law {
     for (int i = 0; i < gains_.n; ++i) {
       // kappa = mu (q + dh - Psi) - mu pulled, each with its own rate; d mu/dt = -mu^2 or 0
       const double pulled = now.s[i] - q_[i] - now.psi[i];
-      const double kappa_dot = gains_.dominating ? 0.0
-                               : floored_        ? mu * q_dot[i]
-                                                 : mu * q_dot[i] - 2.0 * mu * mu *
-                                                       (q_[i] - pulled + now.dh[i] - now.psi[i]);
+      const double kappa_dot =
+          gains_.dominating ? 0.0
+          : floored_        ? mu * q_dot[i]
+                            : mu * q_dot[i] - 2.0 * mu * mu * (q_[i] - pulled + now.dh[i] - now.psi[i]);
       w_dot[i] = -kappa_dot - gains_.kd[i] * q_dot[i] -
                  gain(i) * layer.unit_rate(now.s, s_dot, gains_.n, i, now.eps[i]);
     }
@@ -108,12 +108,14 @@ class AsgIsm : public Law {
     const double layer = gains_.eps0 * std::pow(falling, 1.0 + gains_.beta);
     const double length = gains_.radial ? norm(p, gains_.n) : 0.0;
     for (int i = 0; i < gains_.n; ++i) {
-      out.dh[i] = !gains_.radial ? gains_.sigma * sign(p[i]) : length > 0.0 ? gains_.sigma * p[i] / length : 0.0;
+      out.dh[i] = !gains_.radial ? gains_.sigma * sign(p[i])
+                  : length > 0.0 ? gains_.sigma * p[i] / length
+                                 : 0.0;
       out.psi[i] = out.mu * sum_[i];
       const double pulled = out.mu * (p[i] + eta_[i]);
       out.s[i] = q[i] + pulled + out.psi[i];
-      out.kappa[i] = floored ? out.mu * (q[i] + out.dh[i])
-                             : out.mu * (q[i] - pulled + out.dh[i] - out.psi[i]);
+      out.kappa[i] =
+          floored ? out.mu * (q[i] + out.dh[i]) : out.mu * (q[i] - pulled + out.dh[i] - out.psi[i]);
       out.eps[i] = std::max(layer, gains_.eps_min[i]);
     }
     return out;

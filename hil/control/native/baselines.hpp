@@ -88,8 +88,7 @@ class UtkinIsm : public Law {
     Vec s_dot{}, w{};
     for (int i = 0; i < n_; ++i) s_dot[i] = q_dot[i] - nominal_[i];
     for (int i = 0; i < n_; ++i) {
-      w[i] = -kp_[i] * q_[i] - kd_[i] * q_dot[i] -
-             k_[i] * layer_.unit_rate(s_, s_dot, n_, i, eps_[i]);
+      w[i] = -kp_[i] * q_[i] - kd_[i] * q_dot[i] - k_[i] * layer_.unit_rate(s_, s_dot, n_, i, eps_[i]);
     }
     return w;
   }

@@ -49,69 +49,89 @@ void bind_law(nb::module_& m) {
   nb::class_<Law>(m, "Law")
       .def_prop_ro("dim", &Law::dim)
       .def_prop_ro("s_norm", &Law::s_norm)
-      .def("reset", [](Law& law, const List& p, const List& q) {
-        law.reset(vec(p, law.dim()), vec(q, law.dim()));
-      }, "p"_a, "q"_a)
-      .def("output", [](Law& law, double t, const List& p, const List& q, double h) {
-        return tuple(law.output(t, vec(p, law.dim()), vec(q, law.dim()), h), law.dim());
-      }, "t_s"_a, "p"_a, "q"_a, "dt_s"_a)
-      .def("rate", [](Law& law, const List& q_dot) {
-        return tuple(law.rate(vec(q_dot, law.dim())), law.dim());
-      }, "q_dot"_a)
+      .def(
+          "reset",
+          [](Law& law, const List& p, const List& q) { law.reset(vec(p, law.dim()), vec(q, law.dim())); },
+          "p"_a, "q"_a)
+      .def(
+          "output",
+          [](Law& law, double t, const List& p, const List& q, double h) {
+            return tuple(law.output(t, vec(p, law.dim()), vec(q, law.dim()), h), law.dim());
+          },
+          "t_s"_a, "p"_a, "q"_a, "dt_s"_a)
+      .def(
+          "rate",
+          [](Law& law, const List& q_dot) { return tuple(law.rate(vec(q_dot, law.dim())), law.dim()); },
+          "q_dot"_a)
       .def("advance", &Law::advance, "dt_s"_a);
 }
 
 void bind_asg(nb::module_& m) {
   nb::class_<AsgIsm, Law>(m, "AsgIsm")
-      .def("__init__", [](AsgIsm* self, const List& k, const List& eps_min, double mu0_s, double sigma,
-                          const List& kd, double eps0, double beta, double mu_min, bool componentwise,
-                          bool implicit, bool dominating, bool radial) {
-        AsgGains gains;
-        gains.n = dimension(k);
-        gains.k = vec(k, gains.n);
-        gains.eps_min = spread(eps_min, gains.n);
-        gains.kd = spread(kd, gains.n);
-        gains.mu0 = mu0_s;
-        gains.sigma = sigma;
-        gains.eps0 = eps0;
-        gains.beta = beta;
-        gains.mu_min = mu_min;
-        gains.componentwise = componentwise;
-        gains.implicit = implicit;
-        gains.dominating = dominating;
-        gains.radial = radial;
-        new (self) AsgIsm(gains);
-      }, nb::kw_only(), "k"_a, "eps_min"_a, "mu0_s"_a, "sigma"_a, "kd"_a = List{}, "eps0"_a = 0.0,
-         "beta"_a = 0.5, "mu_min"_a = 0.0, "componentwise"_a = false, "implicit"_a = false,
-         "dominating"_a = false, "radial"_a = false)
-      .def("cost", [](const AsgIsm& law, const List& p) { return law.cost(vec(p, law.dim())); }, "p"_a)
-      .def("terms", [](AsgIsm& law, double t, const List& p, const List& q) {
-        const int n = law.dim();
-        const AsgTerms& now = law.observe(t, vec(p, n), vec(q, n));
-        return nb::make_tuple(tuple(now.s, n), tuple(now.kappa, n), tuple(now.psi, n),
-                              tuple(now.dh, n), tuple(now.eps, n));
-      }, "t_s"_a, "p"_a, "q"_a)
+      .def(
+          "__init__",
+          [](AsgIsm* self, const List& k, const List& eps_min, double mu0_s, double sigma, const List& kd,
+             double eps0, double beta, double mu_min, bool componentwise, bool implicit, bool dominating,
+             bool radial) {
+            AsgGains gains;
+            gains.n = dimension(k);
+            gains.k = vec(k, gains.n);
+            gains.eps_min = spread(eps_min, gains.n);
+            gains.kd = spread(kd, gains.n);
+            gains.mu0 = mu0_s;
+            gains.sigma = sigma;
+            gains.eps0 = eps0;
+            gains.beta = beta;
+            gains.mu_min = mu_min;
+            gains.componentwise = componentwise;
+            gains.implicit = implicit;
+            gains.dominating = dominating;
+            gains.radial = radial;
+            new (self) AsgIsm(gains);
+          },
+          nb::kw_only(), "k"_a, "eps_min"_a, "mu0_s"_a, "sigma"_a, "kd"_a = List{}, "eps0"_a = 0.0,
+          "beta"_a = 0.5, "mu_min"_a = 0.0, "componentwise"_a = false, "implicit"_a = false,
+          "dominating"_a = false, "radial"_a = false)
+      .def(
+          "cost", [](const AsgIsm& law, const List& p) { return law.cost(vec(p, law.dim())); }, "p"_a)
+      .def(
+          "terms",
+          [](AsgIsm& law, double t, const List& p, const List& q) {
+            const int n = law.dim();
+            const AsgTerms& now = law.observe(t, vec(p, n), vec(q, n));
+            return nb::make_tuple(tuple(now.s, n), tuple(now.kappa, n), tuple(now.psi, n), tuple(now.dh, n),
+                                  tuple(now.eps, n));
+          },
+          "t_s"_a, "p"_a, "q"_a)
       .def_prop_ro("eta", [](const AsgIsm& law) { return tuple(law.eta(), law.dim()); })
       .def_prop_ro("averaged", [](const AsgIsm& law) { return tuple(law.averaged(), law.dim()); });
 }
 
 void bind_baselines(nb::module_& m) {
   nb::class_<StateFeedback, Law>(m, "StateFeedback")
-      .def("__init__", [](StateFeedback* self, const List& kp, const List& kd, const List& ki) {
-        const int n = dimension(kp);
-        new (self) StateFeedback(n, vec(kp, n), spread(kd, n), spread(ki, n));
-      }, nb::kw_only(), "kp"_a, "kd"_a, "ki"_a = List{});
+      .def(
+          "__init__",
+          [](StateFeedback* self, const List& kp, const List& kd, const List& ki) {
+            const int n = dimension(kp);
+            new (self) StateFeedback(n, vec(kp, n), spread(kd, n), spread(ki, n));
+          },
+          nb::kw_only(), "kp"_a, "kd"_a, "ki"_a = List{});
   nb::class_<SlidingMode, Law>(m, "SlidingMode")
-      .def("__init__", [](SlidingMode* self, const List& c, const List& k, const List& eps, bool each) {
-        const int n = dimension(c);
-        new (self) SlidingMode(n, vec(c, n), spread(k, n), spread(eps, n), each);
-      }, nb::kw_only(), "c"_a, "k"_a, "eps"_a, "componentwise"_a = false);
+      .def(
+          "__init__",
+          [](SlidingMode* self, const List& c, const List& k, const List& eps, bool each) {
+            const int n = dimension(c);
+            new (self) SlidingMode(n, vec(c, n), spread(k, n), spread(eps, n), each);
+          },
+          nb::kw_only(), "c"_a, "k"_a, "eps"_a, "componentwise"_a = false);
   nb::class_<UtkinIsm, Law>(m, "UtkinIsm")
-      .def("__init__", [](UtkinIsm* self, const List& kp, const List& kd, const List& k, const List& eps,
-                          bool each) {
-        const int n = dimension(kp);
-        new (self) UtkinIsm(n, vec(kp, n), spread(kd, n), spread(k, n), spread(eps, n), each);
-      }, nb::kw_only(), "kp"_a, "kd"_a, "k"_a, "eps"_a, "componentwise"_a = false);
+      .def(
+          "__init__",
+          [](UtkinIsm* self, const List& kp, const List& kd, const List& k, const List& eps, bool each) {
+            const int n = dimension(kp);
+            new (self) UtkinIsm(n, vec(kp, n), spread(kd, n), spread(k, n), spread(eps, n), each);
+          },
+          nb::kw_only(), "kp"_a, "kd"_a, "k"_a, "eps"_a, "componentwise"_a = false);
 }
 
 void bind_signals(nb::module_& m) {

@@ -51,28 +51,31 @@ nb::tuple profile(SimavrBoard& board) {
 
 NB_MODULE(_pil, m) {
   nb::class_<SimavrBoard>(m, "Board")
-      .def("__init__",
-           [](SimavrBoard* self, std::string elf, char uart, double clock_ppm, nb::bytes eeprom) {
-             new (self) SimavrBoard({std::move(elf), uart, clock_ppm, text_of(eeprom)});
-           },
-           "elf_path"_a, "uart"_a, "clock_ppm"_a, "eeprom"_a)
+      .def(
+          "__init__",
+          [](SimavrBoard* self, std::string elf, char uart, double clock_ppm, nb::bytes eeprom) {
+            new (self) SimavrBoard({std::move(elf), uart, clock_ppm, text_of(eeprom)});
+          },
+          "elf_path"_a, "uart"_a, "clock_ppm"_a, "eeprom"_a)
       .def("handle", &handle)
-      .def("power_up",
-           [](SimavrBoard& b, int left_ab, int right_ab) {
-             const std::uint8_t pins[2] = {static_cast<std::uint8_t>(left_ab),
-                                           static_cast<std::uint8_t>(right_ab)};
-             b.set_reset(false, 0, pins);
-           },
-           "left_ab"_a = 0, "right_ab"_a = 0)
-      .def("edge",
-           [](SimavrBoard& b, double t_us, int side, int ab) {
-             b.edge({t_us, side, static_cast<std::uint8_t>(ab)});
-           },
-           "t_us"_a, "side"_a, "ab"_a)
-      .def("receive", [](SimavrBoard& b, std::int64_t t_us, nb::bytes data) {
-             b.receive(t_us, text_of(data));
-           },
-           "t_us"_a, "data"_a)
+      .def(
+          "power_up",
+          [](SimavrBoard& b, int left_ab, int right_ab) {
+            const std::uint8_t pins[2] = {static_cast<std::uint8_t>(left_ab),
+                                          static_cast<std::uint8_t>(right_ab)};
+            b.set_reset(false, 0, pins);
+          },
+          "left_ab"_a = 0, "right_ab"_a = 0)
+      .def(
+          "edge",
+          [](SimavrBoard& b, double t_us, int side, int ab) {
+            b.edge({t_us, side, static_cast<std::uint8_t>(ab)});
+          },
+          "t_us"_a, "side"_a, "ab"_a)
+      .def(
+          "receive",
+          [](SimavrBoard& b, std::int64_t t_us, nb::bytes data) { b.receive(t_us, text_of(data)); }, "t_us"_a,
+          "data"_a)
       .def("advance_to", &SimavrBoard::advance_to, "t_us"_a, "battery_v"_a)
       .def("take_sent",
            [](SimavrBoard& b) {
@@ -84,17 +87,20 @@ NB_MODULE(_pil, m) {
              return out;
            })
       .def("duty", &SimavrBoard::duty, "side"_a)
-      .def("jump", [](SimavrBoard& b, std::uint32_t pc) { b.chip().jump(pc); }, "address"_a)
-      .def("memory",
-           [](SimavrBoard& b, std::uint32_t address, std::uint32_t size) {
-             return bytes_of(b.chip().memory(address, size));
-           },
-           "address"_a, "size"_a)
-      .def("watch",
-           [](SimavrBoard& b, std::uint32_t trigger, std::uint32_t address, std::uint32_t size) {
-             b.chip().watch(trigger, address, size);
-           },
-           "trigger"_a, "address"_a, "size"_a)
+      .def(
+          "jump", [](SimavrBoard& b, std::uint32_t pc) { b.chip().jump(pc); }, "address"_a)
+      .def(
+          "memory",
+          [](SimavrBoard& b, std::uint32_t address, std::uint32_t size) {
+            return bytes_of(b.chip().memory(address, size));
+          },
+          "address"_a, "size"_a)
+      .def(
+          "watch",
+          [](SimavrBoard& b, std::uint32_t trigger, std::uint32_t address, std::uint32_t size) {
+            b.chip().watch(trigger, address, size);
+          },
+          "trigger"_a, "address"_a, "size"_a)
       .def("take_watched",
            [](SimavrBoard& b) {
              nb::list out;
@@ -102,17 +108,18 @@ NB_MODULE(_pil, m) {
              b.chip().watched().clear();
              return out;
            })
-      .def("eeprom",
-           [](SimavrBoard& b, std::uint32_t size) { return bytes_of(b.chip().eeprom(size)); },
-           "size"_a)
-      .def("set_eeprom",
-           [](SimavrBoard& b, nb::bytes data) { b.chip().set_eeprom(text_of(data)); }, "data"_a)
-      .def("start_profile",
-           [](SimavrBoard& b, nb::bytes part_of_word) {
-             const auto* first = reinterpret_cast<const std::uint8_t*>(part_of_word.c_str());
-             b.chip().profiler().start({first, first + part_of_word.size()});
-           },
-           "part_of_word"_a)
+      .def(
+          "eeprom", [](SimavrBoard& b, std::uint32_t size) { return bytes_of(b.chip().eeprom(size)); },
+          "size"_a)
+      .def(
+          "set_eeprom", [](SimavrBoard& b, nb::bytes data) { b.chip().set_eeprom(text_of(data)); }, "data"_a)
+      .def(
+          "start_profile",
+          [](SimavrBoard& b, nb::bytes part_of_word) {
+            const auto* first = reinterpret_cast<const std::uint8_t*>(part_of_word.c_str());
+            b.chip().profiler().start({first, first + part_of_word.size()});
+          },
+          "part_of_word"_a)
       .def("stop_profile", [](SimavrBoard& b) { b.chip().profiler().stop(); })
       .def("profile", &profile)
       .def("usage", &usage)

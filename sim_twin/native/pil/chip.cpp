@@ -77,8 +77,8 @@ avr_io_t* Chip::module(const char* kind, char name) const {
   for (avr_io_t* io = avr_->io_port; io != nullptr; io = io->next) {
     if (std::strcmp(io->kind, kind) != 0) continue;
     const bool is_port = std::strcmp(kind, "port") == 0;
-    const char own = is_port ? reinterpret_cast<avr_ioport_t*>(io)->name
-                             : reinterpret_cast<avr_uart_t*>(io)->name;
+    const char own =
+        is_port ? reinterpret_cast<avr_ioport_t*>(io)->name : reinterpret_cast<avr_uart_t*>(io)->name;
     if (own == name) return io;
   }
   throw std::runtime_error(std::string("this libsimavr has no ") + kind + " " + name);
@@ -157,7 +157,7 @@ void Chip::check_alive() const {
 void Chip::run_to(Cycle end) {
   if (end <= avr_->cycle) return;
   const Cycle limit = profiler_.running() ? 0 : kRunLimit;  // 0: one instruction a call
-  const auto arm_barrier = [&] {  // the processor must not sleep past the end
+  const auto arm_barrier = [&] {                            // the processor must not sleep past the end
     avr_cycle_timer_register(avr_, end > avr_->cycle ? end - avr_->cycle : 1, on_barrier, this);
   };
   avr_->run_cycle_limit = limit;
@@ -283,8 +283,7 @@ void Chip::write_divider(avr_t* avr, Address address, std::uint8_t value, void* 
 // phase-correct mode on these timers and would only complain.
 void Chip::write_compare(avr_t* avr, Address address, std::uint8_t value, void* whole) {
   avr->data[address] = value;
-  *static_cast<std::uint16_t*>(whole) =
-      static_cast<std::uint16_t>(value | avr->data[address + 1] << 8);
+  *static_cast<std::uint16_t*>(whole) = static_cast<std::uint16_t>(value | avr->data[address + 1] << 8);
 }
 
 // ICRn takes a value in a mode only that uses it as top (datasheet, "input capture register"): 8, 10, 12, 14.
@@ -300,10 +299,9 @@ double Chip::duty(int side) const {
   const BridgeHalf& half = kBridge[side];
   const std::uint8_t* data = avr_->data;
   const std::uint8_t outputs = half.forward_bit | half.backward_bit;
-  const bool driven = (data[half.ddr] & outputs) == outputs &&
-                      (data[kDDRA] & data[kPORTA] & half.enable_bit) != 0;
-  const bool running = data[half.tccra] == kPwmModeA &&
-                       (data[half.tccrb] & kPwmModeBMask) == kPwmModeB &&
+  const bool driven =
+      (data[half.ddr] & outputs) == outputs && (data[kDDRA] & data[kPORTA] & half.enable_bit) != 0;
+  const bool running = data[half.tccra] == kPwmModeA && (data[half.tccrb] & kPwmModeBMask) == kPwmModeB &&
                        (data[half.tccrb] & kClockMask) != 0;
   const int top = top_[side].value;
   if (!driven || !running || top == 0) return 0.0;

@@ -21,7 +21,7 @@ struct avr_uart_t;
 namespace pil {
 
 struct SentByte {
-  Cycle done;         // stop bit has left
+  Cycle done;  // stop bit has left
   std::uint8_t byte;
 };
 
@@ -30,11 +30,11 @@ struct Usage {
   Cycle asleep = 0;
   struct Interrupt {
     std::uint64_t count = 0;
-    Cycle sum = 0, worst = 0;       // response and return included
+    Cycle sum = 0, worst = 0;  // response and return included
   };
   std::array<Interrupt, kVectors> interrupt{};
   std::uint64_t watchdog_resets = 0;
-  std::uint64_t wrong_sleeps = 0;   // sleep instruction outside the enabled idle mode
+  std::uint64_t wrong_sleeps = 0;  // sleep instruction outside the enabled idle mode
 };
 
 class Chip {
@@ -48,23 +48,23 @@ class Chip {
   // Reset at a cycle not before now. Power-up also paints the RAM and forgets the usage.
   void power_up(Cycle at);
   void external_reset(Cycle at);
-  void run_to(Cycle end);             // throws when the processor has stopped for good
+  void run_to(Cycle end);  // throws when the processor has stopped for good
   Cycle now() const;
 
-  void set_encoder(int side, std::uint8_t ab);            // now
+  void set_encoder(int side, std::uint8_t ab);               // now
   void set_encoder_at(Cycle at, int side, std::uint8_t ab);  // in time order of each side
-  void set_battery(double battery_v);                     // at the robot's terminals
-  void receive(Cycle start, std::uint8_t byte);           // start bit at that cycle, in order
-  void drop_line();                                       // what is still on its way is lost
+  void set_battery(double battery_v);                        // at the robot's terminals
+  void receive(Cycle start, std::uint8_t byte);              // start bit at that cycle, in order
+  void drop_line();                                          // what is still on its way is lost
   std::vector<SentByte>& sent() { return sent_; }
-  Cycle byte_cycles() const;                              // of the connected UART
-  double duty(int side) const;                            // of the battery voltage, -1..1
+  Cycle byte_cycles() const;    // of the connected UART
+  double duty(int side) const;  // of the battery voltage, -1..1
 
-  void jump(std::uint32_t address);                       // program counter, in bytes
+  void jump(std::uint32_t address);  // program counter, in bytes
   std::string memory(std::uint32_t address, std::uint32_t size) const;
   std::string eeprom(std::uint32_t size) const;
   void set_eeprom(const std::string& bytes);
-  int stack_used() const;             // deepest since power-up, bytes
+  int stack_used() const;  // deepest since power-up, bytes
   // Keeps a copy of a piece of RAM one run after the byte at `trigger` has changed between two, so
   // that whatever was being written with it is complete.
   void watch(std::uint32_t trigger, std::uint32_t address, std::uint32_t size);
@@ -114,14 +114,14 @@ class Chip {
   void (*divider_write_)(avr_t*, Address, std::uint8_t, void*) = nullptr;
   void* divider_param_ = nullptr;
 
-  std::uint8_t level_[2] = {};            // encoder lines as they are outside
-  std::uint16_t compare_[2][2] = {};      // [side][forward, backward], as last written whole
+  std::uint8_t level_[2] = {};        // encoder lines as they are outside
+  std::uint16_t compare_[2][2] = {};  // [side][forward, backward], as last written whole
   struct Top {
     const BridgeHalf* half;
     std::uint16_t value;
   };
   Top top_[2] = {{&kBridge[0], 0}, {&kBridge[1], 0}};  // ICRn, as taken
-  std::uint32_t program_end_ = kRamStart;  // first RAM address behind the program's variables
+  std::uint32_t program_end_ = kRamStart;              // first RAM address behind the program's variables
   std::deque<Level> levels_;
   std::deque<Incoming> incoming_;
   std::vector<SentByte> sent_;

@@ -13,12 +13,12 @@ using Cycle = std::uint64_t;
 class Profiler {
  public:
   struct Instruction {
-    std::uint32_t pc;            // bytes
+    std::uint32_t pc;  // bytes
     std::uint16_t opcode;
     std::uint16_t sp_after;
     Cycle cycles;
-    Cycle response;              // cycles of entering an interrupt behind it, 0 when none was
-    bool interrupts_on;          // behind it
+    Cycle response;      // cycles of entering an interrupt behind it, 0 when none was
+    bool interrupts_on;  // behind it
   };
 
   void start(std::vector<std::uint8_t> part_of_word);
@@ -32,8 +32,8 @@ class Profiler {
 
  private:
   struct Frame {
-    std::uint16_t sp;            // to which the return restores the stack pointer
-    std::uint8_t part;           // inherited by the caller
+    std::uint16_t sp;   // to which the return restores the stack pointer
+    std::uint8_t part;  // inherited by the caller
   };
 
   void follow_calls(const Instruction& it, std::uint8_t part);
@@ -42,7 +42,7 @@ class Profiler {
   std::vector<Cycle> cycles_;
   std::vector<Frame> calls_;
   std::uint8_t inherited_ = 0;
-  Cycle carried_ = 0;            // interrupt response, due to the handler that comes next
+  Cycle carried_ = 0;  // interrupt response, due to the handler that comes next
   bool off_ = false;
   Cycle off_since_ = 0;
   Cycle worst_off_ = 0;

@@ -12,8 +12,7 @@ constexpr std::size_t kChunkBytes = 64;
 }  // namespace
 
 SimavrBoard::SimavrBoard(const SimavrOptions& options)
-    : chip_(options.elf_path, options.uart),
-      cycles_per_us_(kClock_mhz * (1.0 + 1e-6 * options.clock_ppm)) {
+    : chip_(options.elf_path, options.uart), cycles_per_us_(kClock_mhz * (1.0 + 1e-6 * options.clock_ppm)) {
   chip_.set_eeprom(options.eeprom);
 }
 

@@ -12,9 +12,9 @@ namespace pil {
 
 struct SimavrOptions {
   std::string elf_path;
-  char uart = '1';            // '0' USB, '1' Bluetooth: the one the host is on
-  double clock_ppm = 0.0;     // board clock fast against true time
-  std::string eeprom;         // first bytes at the first power-up, the rest erased
+  char uart = '1';         // '0' USB, '1' Bluetooth: the one the host is on
+  double clock_ppm = 0.0;  // board clock fast against true time
+  std::string eeprom;      // first bytes at the first power-up, the rest erased
 };
 
 class SimavrBoard final : public twin::BoardSide {
@@ -36,7 +36,7 @@ class SimavrBoard final : public twin::BoardSide {
   Chip chip_;
   double cycles_per_us_;
   bool held_ = true;
-  Cycle line_free_ = 0;       // when the last byte given to the receive line will be in
+  Cycle line_free_ = 0;  // when the last byte given to the receive line will be in
   std::string sent_bytes_;
   Cycle sent_done_ = 0;
 };

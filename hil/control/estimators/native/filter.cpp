@@ -17,15 +17,13 @@ double wrap_pi(double angle_rad) {
 }
 
 PoseFilter::PoseFilter(const Assumptions& a, double d0_m)
-    : walk_{square(a.slip_ratio), square(a.drift_m_s05), square(a.drift_rad_s05),
-            square(a.d0_walk_m_rad05)},
+    : walk_{square(a.slip_ratio), square(a.drift_m_s05), square(a.drift_rad_s05), square(a.d0_walk_m_rad05)},
       x_{0.0, 0.0, 0.0, 1.0, 1.0, d0_m} {
   P_[kDistance][kDistance] = P_[kTurn][kTurn] = square(a.sigma_scale);
   P_[kOffset][kOffset] = square(a.sigma_d0_m);
 }
 
-void PoseFilter::place(const Pose& pose, double sigma_xy_m, double sigma_theta_rad,
-                       const Excess& excess) {
+void PoseFilter::place(const Pose& pose, double sigma_xy_m, double sigma_theta_rad, const Excess& excess) {
   const double theta = x_[kTheta] + wrap_pi(pose.theta_rad - x_[kTheta]), d0 = x_[kOffset];
   const double c = std::cos(theta), s = std::sin(theta);
   x_[kZ1X] = pose.x_m + d0 * c;
@@ -53,8 +51,7 @@ void PoseFilter::place(const Pose& pose, double sigma_xy_m, double sigma_theta_r
 }
 
 // The point moves along the heading half-way through the turn.
-void PoseFilter::move(double dt_s, double forward_m, double turn_rad, double length_m,
-                      double angle_rad) {
+void PoseFilter::move(double dt_s, double forward_m, double turn_rad, double length_m, double angle_rad) {
   const double middle = x_[kTheta] + 0.5 * x_[kTurn] * turn_rad;
   const double c = std::cos(middle), s = std::sin(middle);
   const double step = x_[kDistance] * forward_m;
@@ -91,8 +88,7 @@ void PoseFilter::move(double dt_s, double forward_m, double turn_rad, double len
 
 Innovation PoseFilter::innovation(const Pose& pose) const {
   return {pose.x_m - x_[kZ1X] + x_[kOffset] * std::cos(x_[kTheta]),
-          pose.y_m - x_[kZ1Y] + x_[kOffset] * std::sin(x_[kTheta]),
-          wrap_pi(pose.theta_rad - x_[kTheta])};
+          pose.y_m - x_[kZ1Y] + x_[kOffset] * std::sin(x_[kTheta]), wrap_pi(pose.theta_rad - x_[kTheta])};
 }
 
 // The components are made independent (R = L D L', each less what those before it say of its error), then

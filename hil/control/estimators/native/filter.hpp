@@ -8,11 +8,13 @@ namespace estimator {
 
 // One list: C++ fields and their Python names, those of EstimatorConfig in hil/config/control.py, where
 // every value has its bounds and its reason. A caller must set them all (no defaults).
+// clang-format off
 #define ESTIMATOR_ASSUMPTIONS(X)                                                               \
   X(double, wheel_lag_s) X(double, sigma_accel_rad_s2) X(double, sigma_short_rad_s15)          \
   X(double, sigma_scale) X(double, sigma_d0_m) X(double, d0_walk_m_rad05)                      \
   X(double, slip_ratio) X(double, drift_m_s05) X(double, drift_rad_s05)                        \
   X(double, sigma_time_s) X(double, gate_chi2) X(int, reacquire_poses) X(double, history_s)
+// clang-format on
 
 struct Assumptions {
 #define X(type, name) type name = 0;

@@ -19,11 +19,9 @@ constexpr Innovation kSlide{3.0, 3.0, 12.0};
 }  // namespace
 
 Fused::Fused(const Assumptions& assumptions, const Geometry& geometry)
-    : assumptions_(assumptions),
-      geometry_(geometry),
-      filter_(assumptions, geometry.d0_m),
-      speeds_(assumptions.wheel_lag_s, assumptions.sigma_accel_rad_s2,
-              assumptions.sigma_short_rad_s15, geometry.rad_per_count) {}
+    : assumptions_(assumptions), geometry_(geometry), filter_(assumptions, geometry.d0_m),
+      speeds_(assumptions.wheel_lag_s, assumptions.sigma_accel_rad_s2, assumptions.sigma_short_rad_s15,
+              geometry.rad_per_count) {}
 
 double Fused::pose_age_s(double t_host_s) const {
   return t_pose_s_ ? t_host_s - *t_pose_s_ : std::numeric_limits<double>::infinity();
@@ -82,8 +80,7 @@ FlatPose Fused::moved(const FlatPose& at, const BodyMotion& by) const {
   const Vector& x = filter_.mean();
   const double step = x[kDistance] * by.forward_m, d_theta = x[kTurn] * by.turn_rad;
   const double middle = at.theta_rad + 0.5 * d_theta;
-  return {at.z1_x_m + step * std::cos(middle), at.z1_y_m + step * std::sin(middle),
-          at.theta_rad + d_theta};
+  return {at.z1_x_m + step * std::cos(middle), at.z1_y_m + step * std::sin(middle), at.theta_rad + d_theta};
 }
 
 FlatPose Fused::anchor() const {
@@ -131,8 +128,7 @@ void Fused::move_anchor(double t_s, const BodyMotion& by) {
   t_anchor_s_ = std::max(t_s, t_anchor_s_);
 }
 
-bool Fused::take_pose(double t_exposure_s, const Pose& pose, double sigma_xy_m,
-                      double sigma_theta_rad) {
+bool Fused::take_pose(double t_exposure_s, const Pose& pose, double sigma_xy_m, double sigma_theta_rad) {
   if (!(t_exposure_s > t_anchor_s_)) return false;  // a time that is no number too
   if (!std::isfinite(pose.x_m + pose.y_m + pose.theta_rad + sigma_xy_m + sigma_theta_rad)) {
     ++gated_total_;
@@ -209,8 +205,8 @@ std::optional<State> Fused::state_at(double t_host_s) const {
   if (!t_pose_s_) return std::nullopt;
   const Vector& x = filter_.mean();
   const WheelSpeeds::Ahead wheels = ahead(t_host_s);
-  const FlatPose at = t_host_s < t_head() ? back_at(t_host_s)
-                                          : moved(head_, geometry_.body(wheels.angle_rad));
+  const FlatPose at =
+      t_host_s < t_head() ? back_at(t_host_s) : moved(head_, geometry_.body(wheels.angle_rad));
   const BodyMotion speed = geometry_.body(wheels.omega_rad_s);
   const double eta1 = x[kDistance] * speed.forward_m, w = x[kTurn] * speed.turn_rad;
   const double c = std::cos(at.theta_rad), s = std::sin(at.theta_rad);

@@ -29,12 +29,9 @@ void CommandHistory::segments(double t0_s, double t1_s, std::vector<Piece>& piec
   }
 }
 
-WheelSpeeds::WheelSpeeds(double lag_s, double sigma_accel_rad_s2, double sigma_short_rad_s15,
-                         double unit_rad)
-    : lag_(lag_s),
-      q_speed_(sigma_accel_rad_s2 * sigma_accel_rad_s2),
-      q_short_(sigma_short_rad_s15 * sigma_short_rad_s15),
-      r_(unit_rad * unit_rad / 12.0) {
+WheelSpeeds::WheelSpeeds(double lag_s, double sigma_accel_rad_s2, double sigma_short_rad_s15, double unit_rad)
+    : lag_(lag_s), q_speed_(sigma_accel_rad_s2 * sigma_accel_rad_s2),
+      q_short_(sigma_short_rad_s15 * sigma_short_rad_s15), r_(unit_rad * unit_rad / 12.0) {
   restart();
 }
 
@@ -66,8 +63,7 @@ void WheelSpeeds::step(double dt_s, const Sides& turned_rad, const std::vector<P
   const double c = -(1.0 - f);
   const auto [p00, p01, p02, p11, p12, p22] = p_;
   // F = [[1, g, b], [0, f, c], [0, 0, 1]]; P = F P F' + Q
-  const double r0 = p00 + g * p01 + b * p02, r1 = p01 + g * p11 + b * p12,
-               r2 = p02 + g * p12 + b * p22;
+  const double r0 = p00 + g * p01 + b * p02, r1 = p01 + g * p11 + b * p12, r2 = p02 + g * p12 + b * p22;
   const double t1 = f * p11 + c * p12, t2 = f * p12 + c * p22;
   const double q = q_speed_ * dt_s * dt_s;
   const double n00 = r0 + g * r1 + b * r2 + 0.25 * q * dt_s * dt_s;

@@ -16,19 +16,19 @@ inline double clip(double x, double limit) { return x > limit ? limit : x < -lim
 enum class End { complete, tumbled, diverged, not_finite };
 
 struct Outcome {
-  double ise = 0.0, ise_late = 0.0;        // integral of |e|^2; late: after the settling time
+  double ise = 0.0, ise_late = 0.0;          // integral of |e|^2; late: after the settling time
   double worst_late = 0.0, cost_late = 0.0;  // largest |e| and sum |e_i| after the settling time
-  double worst_end = 0.0;                  // largest |e| of the last 50 s
+  double worst_end = 0.0;                    // largest |e| of the last 50 s
   double effort = 0.0, effort_early = 0.0;   // integral of |u|^2; early: the first 5 s
   double peak_early = 0.0, peak_late = 0.0;  // largest |u|^2 before and after the study's early_s
-  double peak = 0.0;                       // largest |u_i|
-  double tilt_late = 0.0;                  // largest pitch after the settling time, rad
-  double integral_cost = 0.0;              // sum |integral of e_i| at the end, where a law has it
-  double rate_rms = 0.0;                   // error of the estimated rate after the settling time
-  Vec3 s_max{};                            // largest ||s|| of each stage
+  double peak = 0.0;                         // largest |u_i|
+  double tilt_late = 0.0;                    // largest pitch after the settling time, rad
+  double integral_cost = 0.0;                // sum |integral of e_i| at the end, where a law has it
+  double rate_rms = 0.0;                     // error of the estimated rate after the settling time
+  Vec3 s_max{};                              // largest ||s|| of each stage
   double end_s = 0.0;
   End end = End::complete;
-  std::vector<double> samples;             // row after row
+  std::vector<double> samples;  // row after row
 };
 
 struct Clock {

@@ -110,8 +110,8 @@ struct Tilt {
 
 Tilt tilt(const Quadrotor& p, const Vec3& a, double theta, double phi) {
   const double g = p.gravity_m_s2, lift = std::max(a[2] + g, 0.2 * g);
-  const double thrust = std::max(p.mass_kg * (a[2] + g) / (std::cos(theta) * std::cos(phi)),
-                                 0.05 * p.mass_kg * g);
+  const double thrust =
+      std::max(p.mass_kg * (a[2] + g) / (std::cos(theta) * std::cos(phi)), 0.05 * p.mass_kg * g);
   const double pitch = clip(std::atan2(a[0], lift), p.tilt_max_rad);
   return {thrust, {0.0, pitch, clip(std::atan2(-a[1] * std::cos(pitch), lift), p.tilt_max_rad)}};
 }
@@ -121,7 +121,8 @@ Tilt tilt(const Quadrotor& p, const Vec3& a, double theta, double phi) {
 Outcome fly(const Quadrotor& plant, control::Law& position, control::Law& attitude,
             const std::vector<double>& draws) {
   const double h = plant.step_s;
-  const int ticks = static_cast<int>(plant.duration_s / h), every = std::max(1, static_cast<int>(std::lround(plant.sample_s / h)));
+  const int ticks = static_cast<int>(plant.duration_s / h),
+            every = std::max(1, static_cast<int>(std::lround(plant.sample_s / h)));
   const int hold = std::max(1, static_cast<int>(std::lround(plant.hold_s / h)));
   Tally tally({plant.duration_s, h, plant.settle_s, plant.early_s, plant.give_up_m, every});
   std::array<control::SmoothCommand, 3> smooth{control::SmoothCommand(plant.attitude_filter_rad_s),

@@ -8,6 +8,7 @@
 
 namespace chapters {
 
+// clang-format off
 #define QUADROTOR_PARAMETERS(X)                                                                     \
   X(mass_kg) X(gravity_m_s2) X(ixx_kg_m2) X(iyy_kg_m2) X(izz_kg_m2) X(drag_n_s2_m2) X(motor_lag_s)  \
   X(tilt_max_rad) X(accel_max_m_s2) X(attitude_filter_rad_s) X(attitude_feed_forward)               \
@@ -15,6 +16,7 @@ namespace chapters {
   X(start_x_m) X(start_y_m) X(start_z_m) X(start_vx_m_s) X(start_vy_m_s)                            \
   X(disturbance) X(hold_s) X(duration_s) X(step_s) X(settle_s) X(early_s) X(give_up_m)              \
   X(sample_s)
+// clang-format on
 
 struct Quadrotor {
 #define X(name) double name = 0.0;

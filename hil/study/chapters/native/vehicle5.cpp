@@ -10,7 +10,8 @@ namespace {
 
 struct Rotation {  // body to world, roll 0
   double ct, st, cp, sp;
-  Rotation(double theta, double psi) : ct(std::cos(theta)), st(std::sin(theta)), cp(std::cos(psi)), sp(std::sin(psi)) {}
+  Rotation(double theta, double psi)
+      : ct(std::cos(theta)), st(std::sin(theta)), cp(std::cos(psi)), sp(std::sin(psi)) {}
   Vec3 to_world(const Vec3& b) const {
     return {ct * cp * b[0] - sp * b[1] + st * cp * b[2], ct * sp * b[0] + cp * b[1] + st * sp * b[2],
             -st * b[0] + ct * b[2]};
@@ -36,7 +37,8 @@ Vehicle5::Gust Vehicle5::gust(const Waves<8>& at) const {
           {acc * at.c[6], acc * at.s[7]}};
 }
 
-Vehicle5::State Vehicle5::rates(const Gust& gust, const State& x, const Vec3& torque, const Vec3& volt) const {
+Vehicle5::State Vehicle5::rates(const Gust& gust, const State& x, const Vec3& torque,
+                                const Vec3& volt) const {
   const double theta = x[3], u = x[5], v = x[6], w = x[7], q = x[8], r = x[9];
   const Rotation turn(theta, x[4]);
   const Vec3 moved = turn.to_world({u, v, w});
@@ -60,20 +62,22 @@ Vehicle5::State Vehicle5::rates(const Gust& gust, const State& x, const Vec3& to
   if (driven) {
     const Vec3 speed{u, q, r};
     for (int i = 0; i < 3; ++i) {
-      out[10 + i] = (volt[i] - motor_resistance_ohm * x[10 + i] - motor_emf_v_s_m * speed[i]) / motor_inductance_h;
+      out[10 + i] =
+          (volt[i] - motor_resistance_ohm * x[10 + i] - motor_emf_v_s_m * speed[i]) / motor_inductance_h;
     }
   }
   return out;
 }
 
 double Vehicle5::energy(const State& x) const {
-  return 0.5 * (m11_kg * x[5] * x[5] + m22_kg * x[6] * x[6] + m33_kg * x[7] * x[7] +
-                m55_kg_m2 * x[8] * x[8] + m66_kg_m2 * x[9] * x[9]) +
+  return 0.5 * (m11_kg * x[5] * x[5] + m22_kg * x[6] * x[6] + m33_kg * x[7] * x[7] + m55_kg_m2 * x[8] * x[8] +
+                m66_kg_m2 * x[9] * x[9]) +
          righting_n_m() * (1.0 - std::cos(x[3]));
 }
 
 std::array<Vec3, 3> Vehicle5::reference(double t) const {
-  const double w = 0.02, s = std::sin(w * t), c = std::cos(w * t), b = 0.01 * t - 2.0, b2 = b * b, b6 = b2 * b2 * b2;
+  const double w = 0.02, s = std::sin(w * t), c = std::cos(w * t), b = 0.01 * t - 2.0, b2 = b * b,
+               b6 = b2 * b2 * b2;
   const double d = 1.0 + b6 * b2, d1 = 0.08 * b6 * b, d2 = 56e-4 * b6;  // of 1 + (0.01 t - 2)^8
   return {Vec3{15.0 * s, 15.0 * c, -5.0 / d}, Vec3{15.0 * w * c, -15.0 * w * s, 5.0 * d1 / (d * d)},
           Vec3{-15.0 * w * w * s, -15.0 * w * w * c, 5.0 * (d2 / (d * d) - 2.0 * d1 * d1 / (d * d * d))}};
@@ -94,7 +98,8 @@ class Cascade {
  public:
   Cascade(const Vehicle5& plant, control::Law& position, control::Law& sideways, control::Law& drive)
       : plant_(plant), position_(position), sideways_(sideways), drive_(drive),
-        lag_{control::LowPass(plant.command_lag_s), control::LowPass(plant.command_lag_s), control::LowPass(plant.command_lag_s)},
+        lag_{control::LowPass(plant.command_lag_s), control::LowPass(plant.command_lag_s),
+             control::LowPass(plant.command_lag_s)},
         differ_{make_differ(), make_differ(), make_differ()} {}
 
   // Stages 1 to 3: torques for the state; `error` is the position error of the tick.
@@ -159,7 +164,8 @@ class Cascade {
       if (std::abs(gain_r) <= floor) gain_r = floor;
       if (std::abs(gain_q) <= floor) gain_q = -floor;
       yaw_rate = (want[0] + plant_.d22_kg_s / plant_.m22_kg * v + wish_dot[1]) / gain_r;
-      pitch_rate = (want[1] + plant_.d33_kg_s / plant_.m33_kg * w + wish_dot[2] + yaw_rate * tan * vs) / gain_q;
+      pitch_rate =
+          (want[1] + plant_.d33_kg_s / plant_.m33_kg * w + wish_dot[2] + yaw_rate * tan * vs) / gain_q;
     } else {  // as printed, (7.17): the turning of v*, w* left out
       const double along = away_from_zero(u, plant_.gain_floor_m_s);
       pitch_rate = want[1] / (ratio3 * along);
@@ -167,7 +173,8 @@ class Cascade {
     }
     yaw_rate = clip(yaw_rate, plant_.turn_rate_max_rad_s);
     pitch_rate = clip(pitch_rate, plant_.turn_rate_max_rad_s);
-    pitch_rate = std::min(std::max(pitch_rate, -(theta + plant_.pitch_max_rad)), plant_.pitch_max_rad - theta);
+    pitch_rate =
+        std::min(std::max(pitch_rate, -(theta + plant_.pitch_max_rad)), plant_.pitch_max_rad - theta);
     return {us, pitch_rate, yaw_rate};
   }
 
@@ -205,8 +212,9 @@ Vec3 voltage(const Vehicle5& plant, const Vehicle5::State& x, const Vec3& torque
   const Vec3 speed{x[5], x[8], x[9]};
   Vec3 out;
   for (int i = 0; i < 3; ++i) {
-    out[i] = plant.motor_resistance_ohm * x[10 + i] + plant.motor_emf_v_s_m * speed[i] -
-             plant.motor_inductance_h * plant.motor_loop_rad_s * (x[10 + i] - torque[i] / plant.motor_gain_n_a);
+    out[i] =
+        plant.motor_resistance_ohm * x[10 + i] + plant.motor_emf_v_s_m * speed[i] -
+        plant.motor_inductance_h * plant.motor_loop_rad_s * (x[10 + i] - torque[i] / plant.motor_gain_n_a);
   }
   return out;
 }
@@ -215,7 +223,8 @@ Vec3 voltage(const Vehicle5& plant, const Vehicle5::State& x, const Vec3& torque
 
 Outcome dive(const Vehicle5& plant, control::Law& position, control::Law& sideways, control::Law& drive) {
   const double h = plant.step_s;
-  const int ticks = static_cast<int>(plant.duration_s / h), every = std::max(1, static_cast<int>(std::lround(plant.sample_s / h)));
+  const int ticks = static_cast<int>(plant.duration_s / h),
+            every = std::max(1, static_cast<int>(std::lround(plant.sample_s / h)));
   Tally tally({plant.duration_s, h, plant.settle_s, plant.early_s, plant.give_up_m, every});
   Cascade cascade(plant, position, sideways, drive);
   Vehicle5::State x{};
@@ -249,10 +258,12 @@ Outcome dive(const Vehicle5& plant, control::Law& position, control::Law& sidewa
     const Vehicle5::Gust middle = plant.gust(waves);
     waves.advance();
     const Vehicle5::Gust last = plant.gust(waves);
-    x = rk4([&](double at, const Vehicle5::State& y) {
+    x = rk4(
+        [&](double at, const Vehicle5::State& y) {
           const double done = (at - t) / h;
           return plant.rates(done < 0.25 ? now : done < 0.75 ? middle : last, y, torque, volt);
-        }, t, x, h);
+        },
+        t, x, h);
     now = last;
     if (std::abs(x[3]) > 1.55) {  // 0.02 rad short of 90 degrees, where r/cos(theta) ends
       tally.out.end_s = t + h;

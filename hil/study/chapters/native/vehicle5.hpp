@@ -7,6 +7,7 @@
 
 namespace chapters {
 
+// clang-format off
 #define VEHICLE5_PARAMETERS(X)                                                                      \
   X(m11_kg) X(m22_kg) X(m33_kg) X(m55_kg_m2) X(m66_kg_m2) X(d11_kg_s) X(d22_kg_s) X(d33_kg_s)       \
   X(d55_kg_m2_s) X(d66_kg_m2_s) X(mass_kg) X(gravity_m_s2) X(metacentre_m)                          \
@@ -18,6 +19,7 @@ namespace chapters {
   X(correction_max_m_s) X(surge_min_m_s) X(surge_max_m_s) X(side_max_m_s) X(command_lag_s)          \
   X(feed_differentiator) X(differentiator_bound_m_s2)                                               \
   X(duration_s) X(step_s) X(settle_s) X(early_s) X(give_up_m) X(sample_s)
+// clang-format on
 
 struct Vehicle5 {
 #define X(name) double name = 0.0;
@@ -29,7 +31,7 @@ struct Vehicle5 {
 
   double righting_n_m() const { return mass_kg * gravity_m_s2 * metacentre_m; }
   struct Gust {
-    Vec3 moved, pushed;        // m/s on the world position, m/s^2 on u, v, w
+    Vec3 moved, pushed;            // m/s on the world position, m/s^2 on u, v, w
     std::array<double, 2> turned;  // rad/s^2 on q, r
   };
   Waves<8> waves(double dt, double t = 0.0) const;

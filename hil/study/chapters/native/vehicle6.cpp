@@ -15,7 +15,9 @@ std::array<Vec3, 3> rotation(const Vehicle6::State& x) {
 
 namespace {
 
-Vec3 to_world(const std::array<Vec3, 3>& R, const Vec3& b) { return {dot(R[0], b), dot(R[1], b), dot(R[2], b)}; }
+Vec3 to_world(const std::array<Vec3, 3>& R, const Vec3& b) {
+  return {dot(R[0], b), dot(R[1], b), dot(R[2], b)};
+}
 
 Vec3 to_body(const std::array<Vec3, 3>& R, const Vec3& w) {
   Vec3 out;
@@ -26,7 +28,7 @@ Vec3 to_body(const std::array<Vec3, 3>& R, const Vec3& w) {
 }  // namespace
 
 Vehicle6::Six Vehicle6::inertia() const {
-  return {mass_kg + added_u_kg, mass_kg + added_v_kg, mass_kg + added_w_kg,
+  return {mass_kg + added_u_kg,      mass_kg + added_v_kg,      mass_kg + added_w_kg,
           ixx_kg_m2 + added_p_kg_m2, iyy_kg_m2 + added_q_kg_m2, izz_kg_m2 + added_r_kg_m2};
 }
 
@@ -106,11 +108,12 @@ std::array<Vec3, 3> Vehicle6::reference(double t) const {
 
 Outcome swim(const Vehicle6& plant, control::Law& position, const std::vector<double>& noise) {
   const double h = plant.step_s;
-  const int ticks = static_cast<int>(plant.duration_s / h), every = std::max(1, static_cast<int>(std::lround(plant.sample_s / h)));
+  const int ticks = static_cast<int>(plant.duration_s / h),
+            every = std::max(1, static_cast<int>(std::lround(plant.sample_s / h)));
   Tally tally({plant.duration_s, h, plant.settle_s, plant.early_s, plant.give_up_m, every});
   const auto make = [&plant] {
-    return control::SuperTwisting(plant.differentiator_bound_m_s2, plant.differentiator_l1, plant.differentiator_l0,
-                                  plant.differentiator_implicit > 0.5);
+    return control::SuperTwisting(plant.differentiator_bound_m_s2, plant.differentiator_l1,
+                                  plant.differentiator_l0, plant.differentiator_implicit > 0.5);
   };
   std::array<control::SuperTwisting, 3> differ{make(), make(), make()};
   Vehicle6::State x{};
@@ -172,10 +175,12 @@ Outcome swim(const Vehicle6& plant, control::Law& position, const std::vector<do
     const Vec3 middle = plant.gust(waves);
     waves.advance();
     const Vec3 last = plant.gust(waves);
-    x = rk4([&](double at, const Vehicle6::State& y) {
+    x = rk4(
+        [&](double at, const Vehicle6::State& y) {
           const double done = (at - t) / h;
           return plant.rates(done < 0.25 ? now : done < 0.75 ? middle : last, y, force);
-        }, t, x, h);
+        },
+        t, x, h);
     now = last;
     const double length = std::sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5] + x[6] * x[6]);
     for (int i = 3; i < 7; ++i) x[i] /= length;

@@ -7,6 +7,7 @@
 
 namespace chapters {
 
+// clang-format off
 #define VEHICLE6_PARAMETERS(X)                                                                      \
   X(mass_kg) X(weight_n) X(metacentre_m)                                                            \
   X(added_u_kg) X(added_v_kg) X(added_w_kg) X(added_p_kg_m2) X(added_q_kg_m2) X(added_r_kg_m2)      \
@@ -20,6 +21,7 @@ namespace chapters {
   X(differentiator_l0) X(differentiator_implicit)                                                   \
   X(start_x_m) X(start_y_m) X(start_z_m) X(start_u_m_s)                                             \
   X(duration_s) X(step_s) X(settle_s) X(early_s) X(give_up_m) X(sample_s)
+// clang-format on
 
 struct Vehicle6 {
 #define X(name) double name = 0.0;
