@@ -48,6 +48,8 @@ class VideoFile:
         self._announced_hz = announced_hz if 0.0 < announced_hz < 1e4 else USUAL_RATE_HZ
         self._rate_hz = math.nan
         self._stamps = _recorded_stamps(path)
+        with path.open("rb") as file:
+            self._is_avi = file.read(12)[8:] == b"AVI "
         announced = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
         self.count = len(self._stamps) or max(0, announced)
 
@@ -86,7 +88,9 @@ class VideoFile:
             stamp_s = self._stamp_s(index)
             if index == 1 and stamp_s <= previous_s:
                 stamped = len(self._first_stamps()) > 1
-            if not stamped or (self._stamps and index >= len(self._stamps)):
+            # Decoders that give frames back in another order have no stamp for the last ones of an AVI.
+            lost = self._is_avi and stamp_s == 0.0 < previous_s
+            if not stamped or lost or (self._stamps and index >= len(self._stamps)):
                 stamp_s = previous_s + 1.0 / self.rate_hz
             if stamp_s < previous_s - FALL_BACK_MAX_S:
                 raise BadInput(

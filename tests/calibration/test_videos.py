@@ -85,10 +85,13 @@ def test_a_film_that_starts_late_or_was_begun_within_is_read(tmp_path):
 
 
 def test_an_avi_with_frames_left_out_or_of_another_codec(tmp_path):
-    """Empty chunks for dropped frames, and MPEG-4 in AVI: every picture that is there is read."""
+    """Empty chunks for dropped frames, MPEG-4 and H.264 in AVI: every picture that is there is read."""
     dropped = film(tmp_path / "dropped.avi", [0, 40, 80, 200, 240, 400, 440])
     assert len(stamps_of(dropped)) == 7
     assert len(stamps_of(film(tmp_path / "b.avi", range(0, 1000, 40), "mpeg4"))) == 25
+    long = stamps_of(film(tmp_path / "c.avi", range(0, 4000, 40), "libx264"))
+    assert len(long) == 100
+    assert np.allclose(np.diff(long), 0.04, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["a.mkv", "a.webm", "a.mp4", "a.mov", "a.avi", "a.flv", "a.asf"])
