@@ -167,7 +167,9 @@ hil.estimator("mine")(Mine)
 """
 
 
-@pytest.mark.parametrize("step", ["journal_to_parquet", "read_events", "read_pictures", "replace_file"])
+@pytest.mark.parametrize(
+    "step", ["journal_to_parquet", "read_events", "read_pictures", "replace_file"]
+)
 def test_a_folder_that_goes_away_while_the_record_is_closed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str
 ) -> None:
