@@ -73,7 +73,7 @@ def test_killed_politely_both_ends_leave_as_by_ctrl_c(tmp_path, number):
         run = subprocess.Popen(
             [
                 *HIL, "run", "scenario-1", "--on", f"serial:{port}", "--camera", f"twin:{frames}",
-                "--set", "duration_s=40", "--out", str(folder),
+                "--set", "duration_s=40", "--set", "safety.pose_lost_s=5", "--out", str(folder),
             ],
             stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
@@ -94,7 +94,7 @@ def test_killed_politely_both_ends_leave_as_by_ctrl_c(tmp_path, number):
     assert f"in use by another `hil twin serve` (pid {server.pid})" in second.stderr
     assert run.returncode == 128 + number, run_said
     manifest = json.loads((folder / "manifest.json").read_text())
-    assert manifest["outcome"] == "interrupted"
+    assert manifest["outcome"] == "interrupted", manifest["outcome_detail"]
     assert "stopped" in (folder / "events.jsonl").read_text()
     assert server.returncode == 128 + number
     assert "s behind by now" in said
