@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hil.core.errors import BadInput
-from hil.record.log_signals import MOST_BYTES, read_bytes
+from hil.record.log_signals import MOST_BYTES, read_format
 from hil.record.log_topics import Topic, TopicLog
 from hil.record.log_walk import Holes, walk
 
@@ -35,15 +34,7 @@ Decode = Callable[[bytes], Any]
 
 def read_mcap(path: Path) -> TopicLog:
     """Return the topics of an MCAP file; raises BadInput."""
-    try:
-        import mcap  # noqa: F401, PLC0415 - an extra
-    except ImportError:
-        raise BadInput(
-            f"{path}: reading MCAP needs the package mcap: pip install 'skid-steer-hil[logs]'"
-        ) from None
-    data = read_bytes(path)
-    if data[: len(_MAGIC)] != _MAGIC:
-        raise BadInput(f"{path}: does not begin as an MCAP file does")
+    data = read_format(path, "mcap", "MCAP", _MAGIC, "an MCAP file")
     content = _Content()
     end = len(data) - len(_MAGIC) if data.endswith(_MAGIC) else len(data)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import importlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -51,6 +52,23 @@ def read_bytes(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def read_format(path: Path, package: str, kind: str, magic: bytes, named: str) -> bytes:
+    """Return the bytes of a log whose reader is a package of an extra; raises BadInput.
+
+    `named` is how a file of the kind is called where another one is refused.
+    """
+    try:
+        importlib.import_module(package)
+    except ImportError:
+        raise BadInput(
+            f"{path}: reading {kind} needs the package {package}: pip install 'skid-steer-hil[logs]'"
+        ) from None
+    data = read_bytes(path)
+    if not data.startswith(magic):
+        raise BadInput(f"{path}: does not begin as {named} does")
+    return data
 
 
 def counted_on(raw: Array, wraps_at: float) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 
 from hil.core.errors import BadInput
 from hil.record.log_mapping import Source
-from hil.record.log_signals import read_bytes
+from hil.record.log_signals import read_format
 from hil.record.log_topics import Topic, TopicLog
 from hil.record.log_walk import Holes, walk
 
@@ -37,15 +37,9 @@ STANDARD = {
 
 def read_ulog(path: Path) -> TopicLog:
     """Return the topics of a ULog; raises BadInput."""
-    try:
-        from pyulog import ULog  # noqa: PLC0415 - an extra
-    except ImportError:
-        raise BadInput(
-            f"{path}: reading ULog needs the package pyulog: pip install 'skid-steer-hil[logs]'"
-        ) from None
-    data = read_bytes(path)
-    if data[: len(_MAGIC)] != _MAGIC:
-        raise BadInput(f"{path}: does not begin as a ULog does")
+    data = read_format(path, "pyulog", "ULog", _MAGIC, "a ULog")
+    from pyulog import ULog  # noqa: PLC0415 - an extra
+
     holes = Holes()
     whole = _without_holes(data, holes)
     said = io.StringIO()  # pyulog prints what it thinks of a file
