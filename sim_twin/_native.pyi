@@ -8,6 +8,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from hil.core.rig import LineBacklog
+
 PARAMETERS: tuple[str, ...]
 """Names of the attributes of PlantParams besides `slip`."""
 STATES: tuple[str, ...]
@@ -377,3 +379,27 @@ def floor_map(view: View) -> NDArray[np.float64]:
 
 def project(view: View, x: float, y: float, z: float) -> list[float]:
     """Return the pixel (u, v) of a world point; raises ValueError behind the camera."""
+
+class DrawnRig:
+    """The rig with drawn poses for a camera, as native code of the host drives it."""
+
+    def __init__(
+        self,
+        rig: Rig,
+        drawn: DrawnPoses,
+        backlog: LineBacklog,
+        quality: float,
+        sigma_xy_m: float,
+        sigma_theta_rad: float,
+        true_d0_m: float,
+    ) -> None: ...
+    def set_faults(
+        self, repeats: Sequence[_Span], stamp_steps: Sequence[tuple[float, _Span]]
+    ) -> None:
+        """Take when frames repeat the one before, and by how much stamps are off in other times."""
+
+    def take_frame(self) -> tuple[int, float, tuple[float, float, float] | None, str] | None:
+        """Return number, stamp, pose (None where the robot was not seen) and why not."""
+
+    def handle(self) -> object:
+        """Return what native code takes; it lives as long as this."""

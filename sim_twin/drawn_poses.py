@@ -68,12 +68,12 @@ class DrawnPoses:
     """
 
     def __init__(self, error: LocaliserError, camera: CameraConfig, rng: Random) -> None:
-        self._quality = error.quality_ratio
+        self.quality = error.quality_ratio
         # The localiser's claim never falls to zero: estimators weigh poses by it.
-        self._sigma_xy_m = max(error.sigma_xy_m, 1e-5)
-        self._sigma_theta_rad = max(error.sigma_theta_rad, 1e-5)
+        self.sigma_xy_m = max(error.sigma_xy_m, 1e-5)
+        self.sigma_theta_rad = max(error.sigma_theta_rad, 1e-5)
         marks = camera.marks
-        self._drawn = _native.DrawnPoses(
+        self.native = _native.DrawnPoses(
             error=[getattr(error, name) for name in _native.LOCALISER_ERROR],
             # With the colours exchanged the localiser takes the rear mark for the front one: it sees
             # the robot turned round, displaced by the marks' offset from the centre of mass.
@@ -86,13 +86,16 @@ class DrawnPoses:
     def measure(self, true_pose: PoseTuple | None) -> PoseMeasurement:
         """Return what the localiser might say; `true_pose` is (X, Y, theta), None when hidden."""
         if true_pose is None:
-            return PoseMeasurement(None, 0.0, "hidden from the camera")
-        seen = self._drawn.measure(*true_pose)
-        if seen is None:
-            return PoseMeasurement(None, 0.0, "not seen (drawn)")
+            return self.said(None, "hidden from the camera")
+        return self.said(self.native.measure(*true_pose), "not seen (drawn)")
+
+    def said(self, pose: PoseTuple | None, reason: str) -> PoseMeasurement:
+        """Return a pose drawn as the localiser gives it, or that there is none for this reason."""
+        if pose is None:
+            return PoseMeasurement(None, 0.0, reason)
         return PoseMeasurement(
-            Pose(*seen),
-            self._quality,
-            sigma_xy_m=self._sigma_xy_m,
-            sigma_theta_rad=self._sigma_theta_rad,
+            Pose(*pose),
+            self.quality,
+            sigma_xy_m=self.sigma_xy_m,
+            sigma_theta_rad=self.sigma_theta_rad,
         )

@@ -21,6 +21,11 @@ class HostFaults:
         self._faults = [fault for fault in faults if fault.kind.startswith("host_")]
         self._spans: list[tuple[Fault, Span]] = []
 
+    @property
+    def any(self) -> bool:
+        """True where the host has any."""
+        return bool(self._faults)
+
     def begin(self, span: Callable[[Fault], Span]) -> None:
         """Let the faults' times be those that `span` gives."""
         self._spans = [(fault, span(fault)) for fault in self._faults]

@@ -12,7 +12,7 @@ from random import Random
 from typing import TYPE_CHECKING
 
 from hil.config.robot import BUILT_IN_PLANT
-from hil.control.vehicles.vehicle import make_vehicle
+from hil.control.vehicles.vehicle import TwoSided, make_vehicle
 from hil.core.errors import BadInput, RigFault
 from hil.core.rig import PORT_BYTES, Frame, LineBacklog, Truth
 from hil.core.types import Pose
@@ -60,9 +60,9 @@ class TwinStream:
     The port holds PORT_BYTES; a host that sends faster than the line carries meets it full (RigFault).
     """
 
-    def __init__(self, rig: _native.Rig, baud: int) -> None:
+    def __init__(self, rig: _native.Rig, backlog: LineBacklog) -> None:
         self._rig = rig
-        self._backlog = LineBacklog(baud)
+        self._backlog = backlog
         self.read = rig.read  # every byte that has arrived by now, b"" if none
 
     def write(self, data: bytes) -> None:
@@ -116,8 +116,18 @@ class Twin:
             shutter=Shutter(setup.camera, rng("shutter"), HOST_START_S),
             readout_s=setup.camera.line_time_s * (setup.camera.height_px - 1),
         )
-        self.stream = TwinStream(self._rig, setup.link.baud)
-        self._drawn = DrawnPoses(load_localiser_error(), setup.camera, rng("localiser"))
+        backlog = LineBacklog(setup.link.baud)
+        self.stream = TwinStream(self._rig, backlog)
+        self._drawn = drawn = DrawnPoses(load_localiser_error(), setup.camera, rng("localiser"))
+        self._eye = _native.DrawnRig(
+            self._rig,
+            drawn.native,
+            backlog,
+            drawn.quality,
+            drawn.sigma_xy_m,
+            drawn.sigma_theta_rad,
+            self._vehicle.geometry.d0_m,
+        )
         self._last_frame: Frame | None = None
         self._set_spans(math.inf)
         self._outside = self._open_outside(setup)
@@ -184,6 +194,12 @@ class Twin:
 
     def poll_frame(self) -> Frame | None:
         """Return the oldest frame not yet taken; it is drawn only now."""
+        if self._maker is None:
+            drawn = self._eye.take_frame()
+            if drawn is None:
+                return None
+            index, t_cam_s, pose, reason = drawn
+            return Frame(index, t_cam_s, None, self._drawn.said(pose, reason))
         taken = self._rig.take_frame()
         if taken is None:
             return None
@@ -191,9 +207,6 @@ class Twin:
         repeated = any(begin_s <= start_s < end_s for begin_s, end_s in self._repeats)
         if repeated and self._last_frame is not None:
             self._last_frame = replace(self._last_frame, index=index, t_cam_s=t_cam_s)
-        elif self._maker is None:
-            measured = self._drawn.measure(poses[0] if poses else None)
-            self._last_frame = Frame(index, t_cam_s, None, measured)
         else:
             self._last_frame = Frame(index, t_cam_s, self._pictures.make(start_s, index, poses))
         step_s = sum(
@@ -202,6 +215,13 @@ class Twin:
         if not step_s:
             return self._last_frame
         return replace(self._last_frame, t_cam_s=t_cam_s + step_s)
+
+    def native(self) -> object | None:
+        """Return the handle by which native code drives this rig, None where it needs Python code."""
+        if self._maker is not None or self._outside is not None or self._host.any:
+            return None
+        two_sided = getattr(type(self._vehicle), "flat_output", None) is TwoSided.flat_output
+        return self._eye.handle() if two_sided else None
 
     def truth(self) -> Truth:
         """Return the true state now."""
@@ -228,6 +248,7 @@ class Twin:
             for fault in self._setup.faults
             if fault.kind == "camera_clock_step"
         ]
+        self._eye.set_faults(self._repeats, self._stamp_steps)
         self._rig.set_spans(sorted(spans("camera_stall")), spans("camera_occluded"))
         both = spans("link_cut")
         for channel, one in ((self._rig.down, "link_down_cut"), (self._rig.up, "link_up_cut")):

@@ -64,7 +64,7 @@ Reaction = Literal["stop", "warn"]
 
 
 class ReactionsConfig(Section):
-    """What the host does about each fault that it finds implausible (hil.runs.plausibility)."""
+    """What the host does about each fault that it finds implausible (hil.runs.watching)."""
 
     motor_stuck: Reaction = Field("stop", description="a side creeps at high PWM")
     encoder_intermittent: Reaction = Field("stop", description="counts of a side come and go")

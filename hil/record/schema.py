@@ -8,8 +8,6 @@ null in the file.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -127,12 +125,12 @@ ADDED_LATER = ("pose_accepted",)
 
 SAMPLE_NAMES = tuple(column.name for column in SAMPLE_COLUMNS)
 FRAME_NAMES = tuple(column.name for column in FRAME_COLUMNS)
-_TRACE_KEYS = tuple(column.trace_key for column in LAW_COLUMNS)
+TRACE_KEYS = tuple(column.trace_key for column in LAW_COLUMNS)
 
 
 def own_columns(law: Entry) -> tuple[Column, ...]:
     """Return the columns that a law adds with `trace=`; raises BadInput for a name that is taken."""
-    taken = {*SAMPLE_NAMES, *_TRACE_KEYS}
+    taken = {*SAMPLE_NAMES, *TRACE_KEYS}
     for name in law.trace:
         if name in taken:
             raise BadInput(
@@ -143,9 +141,3 @@ def own_columns(law: Entry) -> tuple[Column, ...]:
         Column(name, unit, "law", meaning, trace_key=name)
         for name, (unit, meaning) in law.trace.items()
     )
-
-
-def trace_row(trace: Mapping[str, float]) -> tuple[float, ...]:
-    """Return a law's trace in the order of LAW_COLUMNS, NaN where the law has no such term."""
-    get = trace.get
-    return tuple([get(key, math.nan) for key in _TRACE_KEYS])

@@ -36,6 +36,11 @@ class Timeline:
             write(t_s - t_host_s)
         self._held.clear()
 
+    @property
+    def origin_s(self) -> float | None:
+        """Host time of the record's zero, None before it is known."""
+        return self._origin_s
+
     def _at(self, t_host_s: float, write: Callable[[float], None]) -> None:
         if self._origin_s is None:
             self._held.append((t_host_s, write))

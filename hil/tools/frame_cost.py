@@ -96,7 +96,7 @@ class _Flooded:
 
     def counts(self) -> tuple[int, int]:
         """Return the board's (overruns, bad frames)."""
-        self.link.sys_status = None
+        self.link.forget_sys_status()
         while self.link.sys_status is None:
             self.drive(_STEP_S)
         return self.link.sys_status.errors_count1, self.link.sys_status.errors_comm

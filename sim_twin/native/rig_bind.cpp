@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "rig.hpp"
+#include "drawn_rig.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -59,6 +59,14 @@ nb::object taken(twin::Rig& rig) {
   for (const twin::PoseSample& pose : frame->poses) poses.append(pose_tuple(pose));
   return nb::make_tuple(frame->exposure.index, frame->exposure.start_s, frame->exposure.t_cam_s,
                         nb::tuple(poses));
+}
+
+// Number, stamp, pose (None where the robot was not seen), and why not.
+nb::object drawn_frame(twin::DrawnRig& rig) {
+  core::PoseFrame f;
+  if (!rig.take_frame(f)) return nb::none();
+  const nb::object pose = f.seen ? nb::object(nb::make_tuple(f.x_m, f.y_m, f.theta_rad)) : nb::none();
+  return nb::make_tuple(f.index, f.t_cam_s, pose, f.reason);
 }
 
 // X, Y, theta, eta1, theta_dot now.
@@ -146,4 +154,20 @@ void bind_rig(nb::module_& m) {
       .def("discard_unsent", &Rig::discard_unsent)
       .def("take_frame", &taken)
       .def("truth", &truth);
+  using twin::DrawnRig;
+  nb::module_::import_("hil.core._native");  // the type of the backlog
+  nb::class_<DrawnRig>(m, "DrawnRig")
+      .def(
+          "__init__",
+          [](DrawnRig* self, Rig& rig, twin::DrawnPoses& drawn, core::LineBacklog& backlog, double quality,
+             double sigma_xy_m, double sigma_theta_rad, double true_d0_m) {
+            new (self) DrawnRig(rig, drawn, {quality, sigma_xy_m, sigma_theta_rad, true_d0_m}, backlog);
+          },
+          nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(), "rig"_a, "drawn"_a,
+          "backlog"_a, "quality"_a, "sigma_xy_m"_a, "sigma_theta_rad"_a, "true_d0_m"_a)
+      .def("set_faults", &DrawnRig::set_faults, "repeats"_a, "stamp_steps"_a)
+      .def("take_frame", &drawn_frame)
+      .def("handle", [](DrawnRig& rig) {
+        return nb::capsule(static_cast<core::SimulatedRig*>(&rig), core::kSimulatedRig);
+      });
 }

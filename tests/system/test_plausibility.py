@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -17,8 +16,9 @@ from hil.core.errors import BadInput, RigFault
 from hil.core.rig import Frame
 from hil.core.types import Pose, PoseMeasurement
 from hil.record.reader import RunRecord
+from hil.runs._native import Plausibility
 from hil.runs.execute import RunSpec, execute_in_memory
-from hil.runs.plausibility import Plausibility
+from hil.runs.watching import picture_of, stops
 from hil.study.fault_campaign import finished_free, run_fault_free
 from hil.study.fault_free import fault_free, most_ratio
 from hil.study.fault_matrix import run_cell
@@ -87,17 +87,14 @@ class Told:
     def __init__(self, **reactions: Any) -> None:
         self.notes: list[str] = []
         self.monitor = Plausibility(
-            ReactionsConfig(**reactions), lambda _, text: self.notes.append(text)
+            stops(ReactionsConfig(**reactions)), lambda _, text: self.notes.append(text)
         )
 
     def wheels(
         self, now_s: float, asked: tuple[float, float], given: tuple[float, float], pwm: int = 200
     ) -> None:
-        sample = SimpleNamespace(omega_left_rad_s=given[0], omega_right_rad_s=given[1])
-        wire = SimpleNamespace(pwm_left_counts=pwm, pwm_right_counts=pwm)
         self.monitor.asked(*asked)
-        report: Any = SimpleNamespace(sample=sample, wire=wire)
-        self.monitor.check(now_s, report, 400)
+        self.monitor.check(now_s, given, (pwm, pwm), 400)
 
 
 def dips(count: int, length: int, told: Told) -> None:
@@ -164,12 +161,10 @@ def test_equal_poses_at_rest_are_no_fault() -> None:
     """Without counts there is nothing that the picture should have shown."""
     told = Told()
     frame = Frame(0, 0.0, None, PoseMeasurement(Pose(0.0, 0.0, 0.0), 1.0))
-    report: Any = SimpleNamespace(sample=SimpleNamespace(counts_left=5, counts_right=5))
     for _ in range(100):
-        told.monitor.saw(frame, report, 0.01)
-    moved: Any = SimpleNamespace(sample=SimpleNamespace(counts_left=105, counts_right=5))
+        told.monitor.saw(picture_of(frame), (5, 5), 0.01)
     with pytest.raises(RigFault, match="frames repeated"):
-        told.monitor.saw(frame, moved, 0.0101)
+        told.monitor.saw(picture_of(frame), (105, 5), 0.0101)
 
 
 @pytest.mark.parametrize("seed", [4, 10])

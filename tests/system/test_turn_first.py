@@ -14,8 +14,8 @@ from hil.control.laws.turn_first import TurnFirst
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import BUILT_IN
 from hil.core.types import OuterCommand
+from hil.runs._native import side_at_limit
 from hil.runs.execute import RunSpec, execute_in_memory
-from hil.runs.wheel_limits import WheelLimits
 from tests.laws.support import D0_M, estimate, point
 
 TICK_S = 1.0 / 30.0
@@ -77,28 +77,19 @@ def test_every_laws_integrators_stand_while_a_side_is_at_its_limit(name):
         assert law.step(point(0.06, 0.0), here, TICK_S).trace["saturated"] == saturated
 
 
-class Wire:
-    """What of a wheel report the limits look at."""
-
-    def __init__(self, pwm, omega):
-        self.pwm_left_counts, self.pwm_right_counts = pwm
-        self.omega_left_rad_s, self.omega_right_rad_s = omega
-
-
-class Report:
-    """A report of the board."""
-
-    def __init__(self, pwm, omega):
-        self.wire = Wire(pwm, omega)
+def sides(pwm, omega, asked, most=400.0):
+    """Return which sides stand at their limit, from PWM counts, speeds, and speeds asked."""
+    return tuple(
+        side_at_limit(counts, wanted - made, most)
+        for counts, made, wanted in zip(pwm, omega, asked, strict=True)
+    )
 
 
 def test_a_side_at_its_limit_lacks_speed_in_its_direction():
     """400 of 400 counts and too slow is a limit; too fast (braking itself out), or 380 counts, is none."""
-    limits = WheelLimits()
-    assert limits.sides(Report((400, -400), (2.0, -1.0)), (8.0, -5.0), 400.0) == (1, -1)
-    assert limits.sides(Report((400, -400), (9.0, -6.0)), (8.0, -5.0), 400.0) == (0, 0)
-    assert limits.sides(Report((380, 0), (2.0, 0.0)), (8.0, 0.0), 400.0) == (0, 0)
-    assert limits.sides(None, (8.0, 0.0), 400.0) == (0, 0)
+    assert sides((400, -400), (2.0, -1.0), (8.0, -5.0)) == (1, -1)
+    assert sides((400, -400), (9.0, -6.0), (8.0, -5.0)) == (0, 0)
+    assert sides((380, 0), (2.0, 0.0), (8.0, 0.0)) == (0, 0)
 
 
 def run(outer, *overrides):

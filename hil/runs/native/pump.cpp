@@ -1,0 +1,121 @@
+#include "pump.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace runs {
+
+std::string odd_stamp(double ahead_s) {
+  if (ahead_s > 0.0) return core::words("stamped %.3f s later than it came", ahead_s);
+  return "stamped earlier than a frame before it, or not at all";
+}
+
+Pump::Stop Pump::begin(double until_s, bool busy) {
+  until_s_ = until_s;
+  waited_ = false;
+  stage_ = kLook;
+  return run(busy);
+}
+
+Pump::Stop Pump::go_on(bool busy) { return run(busy); }
+
+Pump::Stop Pump::run(bool busy) {
+  while (true) {
+    if (stage_ == kLook) {
+      now_s_ = rig_.now_s();
+      watch_.supervisor.check_clock(now_s_);
+      others.clear();
+      reports_.clear();
+      stage_ = kTake;
+      take_bytes();
+      if (busy || !others.empty()) return kHeard;
+    }
+    if (stage_ == kTake) {
+      stage_ = kWait;
+      for (const wire::WheelReport& report : reports_) {
+        watch_.take_report(report);
+        fused_.take_wheels(report.t_board_s, report.wire.left_counts, report.wire.right_counts);
+      }
+      core::PoseFrame frame;
+      while (rig_.take_frame(frame)) take_frame(frame);
+      if (!others.empty()) return kTaken;
+    }
+    stage_ = kLook;
+    if (now_s_ >= until_s_) break;
+    rig_.wait(until_s_);
+    waited_ = true;
+  }
+  if (!waited_) rig_.wait(now_s_);
+  return kReached;
+}
+
+void Pump::take_bytes() {
+  const std::string data = rig_.read();
+  if (!data.empty()) {
+    link_.take(
+        data, now_s_, reports_, [](std::string_view) {},
+        [this](std::string_view frame) { others.emplace_back(wire::message_id(frame), std::string(frame)); });
+  }
+  if (link_.due(now_s_)) link_.run_timers(now_s_, [this](const std::string& frame) { write(frame); });
+}
+
+void Pump::write(const std::string& frame) {
+  rig_.write(frame);
+  ++link_.frames_sent;
+}
+
+// Hands the pose of a frame to the estimator at its exposure time. A frame whose stamp the camera's clock
+// refuses is recorded and not looked at.
+void Pump::take_frame(const core::PoseFrame& frame) {
+  const bool stamped = camera_.arrival(frame.t_cam_s, now_s_);
+  double exposure_s = camera_.to_host_s(frame.t_cam_s);
+  if (camera_.restarts != restarts_) {
+    restarts_ = camera_.restarts;
+    note_("camera", core::words("its clock has stepped by %+.3f s; tied anew", camera_.step_s));
+  }
+  core::PoseFrame said = frame;
+  std::string reason = frame.reason;
+  if (!stamped) {
+    said = core::PoseFrame{};
+    reason = odd_stamp(exposure_s - now_s_);
+  } else {
+    exposure_s = std::min(exposure_s, now_s_);  // jitter aside, no frame is exposed after it came
+    watch_.camera_latency_s = now_s_ - exposure_s;
+  }
+  bool believed = false;
+  if (said.seen) {
+    fused_.expect({});
+    believed = fused_.take_pose(exposure_s, {said.x_m, said.y_m, said.theta_rad}, said.sigma_xy_m,
+                                said.sigma_theta_rad);
+  }
+  std::string picture;  // the pose of the frame itself: whether its stamp is believed does not matter
+  if (frame.seen) {
+    const double pose[3] = {frame.x_m + 0.0, frame.y_m + 0.0, frame.theta_rad + 0.0};
+    picture.assign(reinterpret_cast<const char*>(pose), sizeof(pose));
+  }
+  watch_.take_frame(said, exposure_s, reason, picture, believed, fused_.agreement_age_s(exposure_s));
+  frames.push_back({now_s_, now_s_ - exposure_s, frame.t_cam_s, frame.index, said.seen, said.x_m, said.y_m,
+                    said.theta_rad, said.quality, said.sigma_xy_m, said.sigma_theta_rad});
+}
+
+Agreement Pump::agreement(double now_s) const {
+  const estimator::Vector& x = fused_.filter().mean();
+  const estimator::Innovation& off = fused_.refused();
+  return {fused_.agreement_age_s(now_s),
+          {off[0], off[1], off[2]},
+          {x[estimator::kDistance], x[estimator::kTurn]}};
+}
+
+std::optional<Motion> Pump::estimate(double t_s) const {
+  const auto state = fused_.state_at(t_s);
+  if (!state) return std::nullopt;
+  return Motion{state->pose.x_m, state->pose.y_m,        state->pose.theta_rad, state->eta1_m_s,
+                state->theta_dot_rad_s, state->z1_m[0], state->z1_m[1]};
+}
+
+Motion Pump::truth() const {
+  const core::Truth t = rig_.truth();
+  return {t.x_m, t.y_m, t.theta_rad, t.eta1_m_s, t.theta_dot_rad_s, t.z1_x_m, t.z1_y_m};
+}
+
+}  // namespace runs

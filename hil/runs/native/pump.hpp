@@ -1,0 +1,74 @@
+// Bytes and frames of a simulated rig taken as they arrive, from arrival to arrival, without a step back into
+// Python: for the default estimator and frames that bring their poses. hil/runs/session.py does the same for
+// any rig and any estimator; what both do with what has come is Watch, Link, the clocks and the estimator.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clocks.hpp"
+#include "fused.hpp"
+#include "watch.hpp"
+
+namespace runs {
+
+// Why a frame is not looked at whose exposure would lie ahead_s after its arrival.
+std::string odd_stamp(double ahead_s);
+
+class Pump {
+ public:
+  enum Stop { kReached, kHeard, kTaken };
+
+  Pump(core::SimulatedRig& rig, wire::Link& link, core::CameraClock& camera, estimator::Fused& fused, Watch& watch,
+       Note note)
+      : rig_(rig), link_(link), camera_(camera), fused_(fused), watch_(watch), note_(std::move(note)) {}
+
+  // Takes what arrives until until_s, and waits once at least. Stops on the way where messages wait in
+  // `others`, or after each arrival's bytes where a procedure is under way (`busy`): kHeard before, kTaken
+  // after reports and frames were taken.
+  Stop begin(double until_s, bool busy);
+  Stop go_on(bool busy);
+
+  double now_s() const { return now_s_; }
+  const wire::Link& link() const { return link_; }
+  Agreement agreement(double now_s) const;
+  std::optional<Motion> estimate(double t_s) const;
+  Motion truth() const;
+  void send_setpoint(double t_s, double left_rad_s, double right_rad_s) {
+    write(link_.setpoint(t_s, left_rad_s, right_rad_s));
+  }
+  // Sends a frame to the board.
+  void write(const std::string& frame);
+
+  std::vector<std::pair<std::uint32_t, std::string>> others;  // messages that Python handles
+  struct FrameRow {
+    double t_arrival_s, latency_s, t_cam_s;
+    std::int64_t index;
+    bool seen;
+    double x_m, y_m, theta_rad, quality, sigma_xy_m, sigma_theta_rad;
+  };
+  std::vector<FrameRow> frames;
+
+ private:
+  enum Stage { kLook, kTake, kWait };
+
+  Stop run(bool busy);
+  void take_bytes();
+  void take_frame(const core::PoseFrame& frame);
+
+  core::SimulatedRig& rig_;
+  wire::Link& link_;
+  core::CameraClock& camera_;
+  estimator::Fused& fused_;
+  Watch& watch_;
+  Note note_;
+  Stage stage_ = kLook;
+  double until_s_ = 0.0, now_s_ = 0.0;
+  bool waited_ = false;
+  std::int64_t restarts_ = 0;
+  std::vector<wire::WheelReport> reports_;
+};
+
+}  // namespace runs

@@ -1,0 +1,85 @@
+"""Those who judge a run between its ticks, and what they judge by. The code is native/*.hpp.
+
+- Supervision: when the host stops the robot by itself (board, link, camera, fence, camera against wheels).
+- Plausibility: residuals between commands, wheels, PWM and camera, each a named fault with its evidence.
+  What the board judges by itself (stall, runaway, overspeed, silence) stays with it and comes first; the
+  host sees what needs the command, the camera or more time: a side that only creeps, frames that repeat,
+  sides exchanged, an encoder that comes and goes, a robot that gets nowhere. A side that is weak is told
+  and stops nothing. False-alarm and detection figures: docs/faults.md.
+- Limits: which side stands at the board's limit, from what the board reports, and what that cost. A side
+  is at its limit when the duty it reports is the most that PWM_MAX lets it give, in the direction of the
+  speed it lacks.
+
+Nothing here reads a clock. World frame, SI; sides are (left, right), positive is forward.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from hil.control.estimators.fused import Fused
+from hil.record.memory import MemoryRecorder
+from hil.runs import _native
+
+if TYPE_CHECKING:
+    from hil.config.scenario import ReactionsConfig, Scenario
+    from hil.core.rig import Frame
+    from hil.runs.parts import Parts
+
+Note = Callable[[str, str], None]
+DIAGNOSIS = "diagnosis"  # kind of the record's events that the verdict repeats
+# Of every how many rows and columns of an image one is compared with the image before.
+_EVERY = 16
+
+
+def stops(reactions: ReactionsConfig) -> list[bool]:
+    """Return which of `_native.REACTIONS` end the run; the others are told once."""
+    return [getattr(reactions, name) == "stop" for name in _native.REACTIONS]
+
+
+def make_watch(scenario: Scenario, parts: Parts, note: Note) -> _native.Watch:
+    """Return the judges of one run; they raise RigFault when the robot has to stop."""
+    safety = scenario.safety
+    return _native.Watch(
+        fence_m=[
+            safety.fence_x_min_m,
+            safety.fence_x_max_m,
+            safety.fence_y_min_m,
+            safety.fence_y_max_m,
+        ],
+        link_lost_s=safety.link_lost_s,
+        pose_lost_s=safety.pose_lost_s,
+        stops=stops(safety.reactions),
+        note=note,
+        uplink_s=scenario.link.latency_s,
+        rad_per_count=parts.vehicle.geometry.rad_per_count,
+    )
+
+
+def make_pump(parts: Parts, watch: _native.Watch, note: Note) -> _native.Pump | None:
+    """Return what takes bytes and frames in without a step into Python; None where somebody asks for them.
+
+    It needs a simulated rig that gives poses, the default estimator itself, and a record in memory.
+    """
+    handle = getattr(parts.rig, "native", None)
+    sink = parts.recorder
+    if handle is None or type(parts.estimator) is not Fused:
+        return None
+    if type(sink) is not MemoryRecorder or sink.keep_link:
+        return None
+    rig = handle()
+    if rig is None:
+        return None
+    return _native.Pump(rig, parts.link.native, parts.camera_clock, parts.estimator, watch, note)
+
+
+def picture_of(frame: Frame) -> bytes:
+    """Return what equal pictures have equal, b"" where there is nothing to compare."""
+    if frame.image is not None:
+        return bytes(frame.image[::_EVERY, ::_EVERY].tobytes())
+    pose = frame.pose.pose if frame.pose is not None else None
+    if pose is None:
+        return b""
+    return struct.pack("3d", pose.x_m + 0.0, pose.y_m + 0.0, pose.theta_rad + 0.0)

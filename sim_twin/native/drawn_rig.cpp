@@ -1,0 +1,65 @@
+#include "drawn_rig.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace twin {
+namespace {
+
+bool within(const Span& span, double t_s) { return span.first <= t_s && t_s < span.second; }
+
+}  // namespace
+
+void DrawnRig::wait(double until_s) {
+  try {
+    rig_.wait(until_s, 1);
+  } catch (const std::runtime_error& error) {
+    throw core::RigFault(std::string("twin: ") + error.what() + "; check the robot's parameters");
+  }
+}
+
+bool DrawnRig::take_frame(core::PoseFrame& frame) {
+  const auto taken = rig_.take_frame();
+  if (!taken) return false;
+  const Exposure& exposure = taken->exposure;
+  bool repeated = false;
+  for (const Span& span : repeats_) repeated = repeated || within(span, exposure.start_s);
+  if (!repeated || !last_) {
+    last_ = core::PoseFrame{};
+    if (taken->poses.empty()) {
+      last_->reason = "hidden from the camera";
+    } else if (const auto seen = drawn_.measure(taken->poses.front())) {
+      last_->seen = true;
+      last_->x_m = seen->x_m;
+      last_->y_m = seen->y_m;
+      last_->theta_rad = seen->theta_rad;
+      last_->quality = claim_.quality;
+      last_->sigma_xy_m = claim_.sigma_xy_m;
+      last_->sigma_theta_rad = claim_.sigma_theta_rad;
+    } else {
+      last_->reason = "not seen (drawn)";
+    }
+  }
+  last_->index = exposure.index;
+  last_->t_cam_s = exposure.t_cam_s;
+  frame = *last_;
+  double step_s = 0.0;
+  for (const auto& [size_s, span] : stamp_steps_) step_s += within(span, exposure.start_s) ? size_s : 0.0;
+  if (step_s != 0.0) frame.t_cam_s += step_s;
+  return true;
+}
+
+core::Truth DrawnRig::truth() const {
+  const PoseSample p = rig_.pose_at(rig_.now_s());
+  const StateVector& x = rig_.kernel().state();
+  return {p.x_m,
+          p.y_m,
+          p.theta_rad,
+          x[kEta1],
+          x[kThetaDot],
+          p.x_m + claim_.true_d0_m * std::cos(p.theta_rad),
+          p.y_m + claim_.true_d0_m * std::sin(p.theta_rad)};
+}
+
+}  // namespace twin
