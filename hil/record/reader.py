@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from hil.analysis import metrics
+from hil.analysis.pieces import row_count
 from hil.analysis.sliding import LawFacts
 from hil.core.errors import BadInput
 from hil.record import layout
@@ -75,7 +76,7 @@ class RunRecord:
 
     def figures(self) -> metrics.Figures:
         """Return the figures, computed from the samples; all are NaN below two ticks."""
-        if self.samples["t_s"].size < 2:
+        if row_count(self.samples) < 2:
             return metrics.no_figures(self.samples)
         return metrics.compute(self.samples, self.link_stats(), self.law_facts())
 

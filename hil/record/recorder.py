@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.analysis import metrics
+from hil.analysis.pieces import row_count
 from hil.core.errors import BadInput, RecordFault
 from hil.core.files import PART, replace_file
 from hil.record import layout
@@ -220,7 +221,7 @@ class Recorder:
         ended = {
             "outcome": outcome,
             "outcome_detail": detail,
-            "tick_count": int(samples["t_s"].size),
+            "tick_count": row_count(samples),
             "link": {key: float(value) for key, value in dataclasses.asdict(stats).items()},
         }
         run = RunRecord(
