@@ -185,7 +185,7 @@ class ColumnsOnDisk(Mapping[str, "NDArray[np.float64]"]):
         if name not in self._names:
             raise KeyError(name)
         try:
-            with pq.ParquetFile(self._path) as file:
+            with pq.ParquetFile(self._path, pre_buffer=False) as file:
                 return _floats(file.read(columns=[name]).column(name))
         except (OSError, pa.ArrowException) as error:
             raise _damaged(self._path, error) from None
@@ -196,9 +196,10 @@ class ColumnsOnDisk(Mapping[str, "NDArray[np.float64]"]):
             if name not in self._names:
                 raise KeyError(name)
         try:
-            with pq.ParquetFile(self._path) as file:
+            with pq.ParquetFile(self._path, pre_buffer=False) as file:
                 for number in range(file.num_row_groups):
-                    table = file.read_row_group(number, columns=list(dict.fromkeys(names)))
+                    wanted = list(dict.fromkeys(names))
+                    table = file.read_row_group(number, wanted, use_threads=False)
                     yield {name: _floats(table.column(name)) for name in names}
         except (OSError, pa.ArrowException) as error:
             raise _damaged(self._path, error) from None

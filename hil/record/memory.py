@@ -15,8 +15,7 @@ from hil.record.reader import Event, RunRecord
 from hil.record.schema import FRAME_NAMES
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from hil.core.rig import Picture
     from hil.record.journal import Columns
     from hil.record.manifest import Manifest, Outcome
 
@@ -34,7 +33,7 @@ class RunSink(Protocol):
     def append(self, row: Sequence[float]) -> None:
         """Take one outer tick in the order of the manifest's sample_names."""
 
-    def frame(self, row: Sequence[float], image: NDArray[np.uint8] | None = None) -> None:
+    def frame(self, row: Sequence[float], image: Picture | None = None) -> None:
         """Take one camera frame in the order of schema.FRAME_NAMES, and its image."""
 
     def event(self, t_s: float, kind: str, text: str) -> None:
@@ -94,7 +93,7 @@ class MemoryRecorder:
         """Take one outer tick in the order of the manifest's sample_names."""
         self.rows.append(row)
 
-    def frame(self, row: Sequence[float], image: NDArray[np.uint8] | None = None) -> None:  # noqa: ARG002
+    def frame(self, row: Sequence[float], image: Picture | None = None) -> None:  # noqa: ARG002
         """Take one camera frame in the order of schema.FRAME_NAMES."""
         self.frames.append(row)
 

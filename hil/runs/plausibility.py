@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from hil.core.errors import RigFault
+from hil.core.rig import whole
 
 if TYPE_CHECKING:
     from hil.config.scenario import ReactionsConfig
@@ -257,6 +258,8 @@ class Plausibility:
 
 def _picture_of(frame: Frame) -> object:
     """Return what equal pictures have equal, None where there is nothing to compare."""
-    if frame.image is not None:
-        return frame.image[::16, ::16].tobytes()
+    picture = frame.picture
+    if picture is not None:
+        content: object = getattr(picture, "content", None)
+        return content or whole(picture)[::16, ::16].tobytes()
     return frame.pose.pose if frame.pose is not None else None

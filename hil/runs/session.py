@@ -334,11 +334,11 @@ class Session:
         """Return the frame's own pose, else what the localiser finds near the estimate."""
         if frame.pose is not None:
             return frame.pose
-        assert frame.image is not None
+        assert frame.picture is not None
         before = self._parts.estimator.estimate_at(exposure_s)
         camera = self._scenario.camera
         predicted = before.pose if before is not None else None
-        seen = self._parts.localiser.locate(frame.image, predicted, camera.search_radius_m)
+        seen = self._parts.localiser.locate(frame.picture, predicted, camera.search_radius_m)
         return unrolled(seen, camera, before)
 
     def _estimate(self, t_effect_s: float) -> Estimate:

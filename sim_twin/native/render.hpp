@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -99,6 +100,18 @@ struct Sample {
   int slot = 0;
 };
 
+// Columns u0 to u1 - 1 of rows v0 to v1 - 1.
+struct Window {
+  int u0, v0, u1, v1;
+
+  bool empty() const { return u1 <= u0 || v1 <= v0; }
+  bool holds(const Window& w) const {
+    return w.empty() || (u0 <= w.u0 && v0 <= w.v0 && u1 >= w.u1 && v1 >= w.v1);
+  }
+  Window grown(int by) const { return {u0 - by, v0 - by, u1 + by, v1 + by}; }
+};
+Window common(const Window& a, const Window& b);
+
 class Renderer {
  public:
   Renderer(const View& view, const Scene& scene, const Robot& robot, uint64_t seed);
@@ -108,11 +121,17 @@ class Renderer {
   // Writes the frame `index`, (height, width, 3); poses are (x, y, theta), evenly spaced from
   // the start to the end of the exposure.
   void make(uint64_t index, const std::vector<std::array<double, 3>>& poses, uint8_t* out);
+  // Writes only the pixels of a window of that frame, the same ones, where they are in the whole.
+  void draw(uint64_t index, const std::vector<std::array<double, 3>>& poses, const Window& wanted,
+            uint8_t* out);
 
  private:
-  struct Window {
-    int u0, v0, u1, v1;
+  // What the robot at the poses in `slots_` hides and shades of a window, before noise.
+  struct Part {
+    Window at{0, 0, 0, 0};
+    std::vector<int16_t> level, sigma;
   };
+  static constexpr size_t MOST_PARTS = 4;
   void background();
   void edge_table();
   void noise_bank();
@@ -123,8 +142,9 @@ class Renderer {
   static bool same(const std::vector<Pose>& a, const std::vector<Pose>& b);
   Window window(double reach_m) const;
   void set_windows();
-  void classify();
-  void composite();
+  const Part& part(const Window& wanted);
+  Part composite(const Window& w);
+  void classify(const Window& w);
   void composite_pixel(int u, int v, uint8_t flags, uint8_t id, float shade, float* dn) const;
   void trace_samples(int u, int v, const Sample* samples, int count, uint8_t flags, uint8_t* hits) const;
   uint8_t trace(const Sight& world, const Pose& pose) const;
@@ -147,11 +167,11 @@ class Renderer {
   std::vector<uint8_t> mark_id_, edge_of_ids_;
   int reach_ = 1;  // px that the lens blur carries an edge
   float robot_radius_ = 0, robot_height_ = 0;
-  std::vector<Pose> slots_;                         // as last composited into the window buffers
+  std::vector<Pose> slots_;                         // as last drawn
+  std::vector<Part> parts_;                         // what was drawn of it so far
   Window shaded_{0, 0, 0, 0}, hidden_{0, 0, 0, 0};  // what the robot shades; what it may hide
   std::vector<uint8_t> id_first_, id_last_, flags_, flags_row_;
   std::vector<float> dn_, shade_;
-  std::vector<int16_t> window_level_, window_sigma_;
 };
 
 // Normalised, undistorted coordinates of a pixel, by fixed-point iteration.
