@@ -114,7 +114,9 @@ def _of_ranks(parts: Callable[[], Iterator[Array]], ranks: Sequence[int]) -> lis
         for values in parts():
             keys = _keys(values[np.isfinite(values)])
             for prefix, histogram in counts.items():
-                own = keys if shift == _TOP_SHIFT else keys[(keys >> np.uint64(shift + 16)) == prefix]
+                own = (
+                    keys if shift == _TOP_SHIFT else keys[(keys >> np.uint64(shift + 16)) == prefix]
+                )
                 digits = (own >> np.uint64(shift)) & np.uint64(0xFFFF)
                 histogram += np.bincount(digits.astype(np.int64), minlength=1 << _DIGIT_BITS)
         for which, prefix in enumerate(found.copy()):

@@ -176,7 +176,14 @@ def _share(columns: Columns, facts: LawFacts) -> float:
     return median(lambda: (share[~np.isnan(share)] for share, _ in parts()))
 
 
-_OF_SHARE = ("s_x_m_s2", "s_y_m_s2", "eps_m_s2", "est_theta_rad", "est_eta1_m_s", "est_theta_dot_rad_s")
+_OF_SHARE = (
+    "s_x_m_s2",
+    "s_y_m_s2",
+    "eps_m_s2",
+    "est_theta_rad",
+    "est_eta1_m_s",
+    "est_theta_dot_rad_s",
+)
 
 
 def _shares(piece: Columns, facts: LawFacts) -> tuple[Array, Array]:

@@ -120,6 +120,8 @@ Renderer::Renderer(const View& view, const Scene& scene, const Robot& robot, uin
 
 Renderer::Renderer(const Renderer& other, uint64_t seed) : Renderer(other) {
   seed_ = seed;
+  slots_.clear();
+  parts_.clear();
   noise_bank();
 }
 
@@ -185,7 +187,8 @@ SightPatch Renderer::sight_patch(int u, int v) const {
 
 void Renderer::background() {
   const size_t pixels = sight_.size();
-  for (std::vector<float>* map : {&floor_dn_, &glare_dn_, &dn_}) map->resize(3 * pixels);
+  for (Shared<float>* map : {&floor_dn_, &glare_dn_}) map->resize(3 * pixels);
+  std::vector<float> both(3 * pixels);
   for (int v = 0; v < view_.height; ++v)
     for (int u = 0; u < view_.width; ++u) {
       const size_t at = static_cast<size_t>(v) * view_.width + u;
@@ -200,12 +203,12 @@ void Renderer::background() {
         const float gain = scene_.white_balance[k];
         floor_dn_[3 * at + k] = gain * sum[k] / SAMPLES_BACKGROUND * scene_.light[at];
         glare_dn_[3 * at + k] = gain * scene_.glare[at];
-        dn_[3 * at + k] = floor_dn_[3 * at + k] + glare_dn_[3 * at + k];
+        both[3 * at + k] = floor_dn_[3 * at + k] + glare_dn_[3 * at + k];
       }
     }
   level_.resize(3 * pixels);
   sigma_.resize(3 * pixels);
-  quantise(dn_.data(), static_cast<int>(3 * pixels), level_.data(), sigma_.data());
+  quantise(both.data(), static_cast<int>(3 * pixels), level_.data(), sigma_.data());
 }
 
 // The part of the image that the robot at its first and last pose can reach, grown by `reach_m` on

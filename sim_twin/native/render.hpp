@@ -9,9 +9,26 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <utility>
 #include <vector>
 
 namespace camera {
+
+// Numbers worked out once; a copy has the same ones, not its own. Not to be written after the first copy.
+template <class T>
+class Shared {
+ public:
+  Shared() = default;
+  Shared(std::vector<T> values) : values_(std::make_shared<std::vector<T>>(std::move(values))) {}
+  void resize(size_t count) { values_->resize(count); }
+  size_t size() const { return values_->size(); }
+  T* data() const { return values_->data(); }
+  T& operator[](size_t i) const { return (*values_)[i]; }
+
+ private:
+  std::shared_ptr<std::vector<T>> values_ = std::make_shared<std::vector<T>>();
+};
 
 using Colour = std::array<float, 3>;  // reflectance: blue, green, red
 
@@ -62,14 +79,14 @@ struct Robot {
 };
 
 struct Scene {
-  std::vector<float> texture;  // floor reflectance factor, periodic, by rows
+  Shared<float> texture;  // floor reflectance factor, periodic, by rows
   int texture_size = 0;        // px per side
   float texture_step = 0;      // m per px
   Colour floor{};
   std::vector<Block> blocks;
   std::vector<Bar> bars;
-  std::vector<float> light;  // DN of a white surface, per pixel
-  std::vector<float> glare;  // DN added, per pixel
+  Shared<float> light;  // DN of a white surface, per pixel
+  Shared<float> glare;  // DN added, per pixel
   Colour white_balance{};
   float blur = 0;                             // px RMS
   float read_noise = 0, dn_per_electron = 0;  // DN
@@ -158,9 +175,9 @@ class Renderer {
   Scene scene_;
   Robot robot_;
   uint64_t seed_;
-  std::vector<Sight> sight_;                // per pixel centre
-  std::vector<float> floor_dn_, glare_dn_;  // background before noise: what shade takes, the rest
-  std::vector<int16_t> level_, sigma_;      // the same in the noise stage's steps
+  Shared<Sight> sight_;                // per pixel centre
+  Shared<float> floor_dn_, glare_dn_;  // background before noise: what shade takes, the rest
+  Shared<int16_t> level_, sigma_;      // the same in the noise stage's steps
   std::vector<int16_t> normal_;
   std::vector<Sample> samples_;
   std::vector<Colour> colour_of_id_;

@@ -43,6 +43,7 @@ QUALITY_RESIDUAL = 0.06  # of the radius
 # What is hardly within each limit is no robot: the least of extreme blur and noise has 0.17.
 QUALITY_MIN = 0.12
 SAME_PLACE_M = 0.02
+_UPPER = np.triu_indices(3)
 TWO_PLACES = "two places look like the robot"
 
 
@@ -269,7 +270,7 @@ class MarkLocaliser:
             quality=self._quality(found),
             sigma_xy_m=math.sqrt(0.5 * (covariance[0, 0] + covariance[1, 1])),
             sigma_theta_rad=math.sqrt(covariance[2, 2]),
-            covariance=tuple(covariance[np.triu_indices(3)].tolist()),
+            covariance=tuple(covariance[_UPPER].tolist()),
             details={
                 "front_u_px": front.u_px,
                 "front_v_px": front.v_px,
