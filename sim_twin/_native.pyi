@@ -373,6 +373,16 @@ class Renderer:
         """Return the same scene with the noise of another seed."""
     def make(self, index: int, poses: Sequence[tuple[float, float, float]]) -> NDArray[np.uint8]:
         """Return frame `index`, (height, width, 3) BGR; no poses: the empty scene."""
+    def blank(self) -> NDArray[np.uint8]:
+        """Return memory for a frame, nothing drawn in it."""
+    def draw(
+        self,
+        index: int,
+        poses: Sequence[tuple[float, float, float]],
+        window: tuple[int, int, int, int],
+        image: NDArray[np.uint8],
+    ) -> None:
+        """Draw the pixels of a window (left, top, right, bottom) of that frame into `image`."""
 
 def floor_map(view: View) -> NDArray[np.float64]:
     """Return world (X, Y) on the floor seen by every pixel, (height, width, 2)."""

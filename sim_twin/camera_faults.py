@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from hil.config.camera import CameraConfig
     from hil.config.events import Fault
+    from hil.core.rig import Picture
     from sim_twin.camera_timing import Span
     from sim_twin.drawn_poses import PoseTuple
 
@@ -27,6 +28,9 @@ class FrameMaker(Protocol):
 
     def make(self, index: int, poses: Sequence[PoseTuple]) -> NDArray[np.uint8]:
         """Return the image of frame `index`; no poses: the robot is not to be seen."""
+
+    def draw(self, index: int, poses: Sequence[PoseTuple]) -> Picture:
+        """Return the same, drawn where it is looked at."""
 
 
 class FaultyMaker:
@@ -55,14 +59,16 @@ class FaultyMaker:
         """Let the faults' times be those that `span` gives."""
         self._spans = [span(fault) for fault in self._faults]
 
-    def make(self, t_s: float, index: int, poses: Sequence[PoseTuple]) -> NDArray[np.uint8]:
-        """Return the image of frame `index`, exposed from `t_s` on."""
+    def make(self, t_s: float, index: int, poses: Sequence[PoseTuple]) -> Picture:
+        """Return the picture of frame `index`, exposed from `t_s` on; drawn at once where it is faulty."""
         assert self._maker is not None
         now = [
             fault
             for fault, (start_s, end_s) in zip(self._faults, self._spans, strict=True)
             if start_s <= t_s < end_s
         ]
+        if not now:
+            return self._maker.draw(index, poses)
         covered = any(fault.kind == "camera_mark_covered" for fault in now)
         image = ((self._covered if covered else None) or self._maker).make(index, poses)
         for fault in now:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -28,6 +29,9 @@ from hil.core.errors import BadInput
 from sim_twin import _native
 from vision.camera_setup import camera_model
 
+if TYPE_CHECKING:
+    from hil.core.rig import Picture
+
 TEXTURE_SIZE = 800
 TEXTURE_PERIOD_M = 2.0  # about; a whole number of tiles
 JOINT_M = 0.004
@@ -38,7 +42,11 @@ BAND_ROWS = 16
 BAND_POSES = 5
 ROBOT_REACH_M = 0.3
 
+BLOCK_PX = 8
+
 Map = NDArray[np.float64]
+PoseTuple = tuple[float, float, float]
+Window = tuple[int, int, int, int]  # left, top, right, bottom, px
 
 
 class RenderedCamera:
@@ -50,17 +58,26 @@ class RenderedCamera:
         self._renderer = _renderer(camera).reseeded(seed)
         self._camera = camera
 
-    def make(self, index: int, poses: Sequence[tuple[float, float, float]]) -> NDArray[np.uint8]:
+    def make(self, index: int, poses: Sequence[PoseTuple]) -> NDArray[np.uint8]:
         """Return frame `index`, (height, width, 3) uint8 BGR.
 
         `poses` are (x_m, y_m, theta_rad) of the robot in world axes, evenly spaced from the start
         to the end of the exposure (two or more show motion blur); none gives the empty floor. With a
         rolling shutter that is from the start of the first row's exposure to the end of the last's.
         """
-        if self._camera.line_time_s > 0.0 and len(poses) > 1:
+        if self._rolls(poses):
             return self._rolled(index, np.asarray(poses, np.float64))
         image: NDArray[np.uint8] = self._renderer.make(index, poses)
         return image
+
+    def draw(self, index: int, poses: Sequence[PoseTuple]) -> Picture:
+        """Return frame `index` as `make` does, drawn only where it is looked at."""
+        if self._rolls(poses):
+            return self.make(index, poses)
+        return DrawnFrame(self._renderer, index, tuple(poses), (self.height_px, self.width_px, 3))
+
+    def _rolls(self, poses: Sequence[PoseTuple]) -> bool:
+        return self._camera.line_time_s > 0.0 and len(poses) > 1
 
     def _rolled(self, index: int, poses: Map) -> NDArray[np.uint8]:
         """Return a frame put together from bands of rows, each drawn as the robot was then."""
@@ -90,6 +107,55 @@ class RenderedCamera:
         points = np.vstack([np.column_stack((floor, np.full(8, z))) for z in (0.0, 0.15)])
         rows = camera_model(self._camera).project(points)[:, 1]
         return bool(rows.min() - BAND_ROWS <= row <= rows.max() + BAND_ROWS)
+
+
+class DrawnFrame:
+    """A frame drawn where it is looked at, in blocks of BLOCK_PX; every pixel is that of the whole frame.
+
+    A robot that stands is so drawn once, though where it is expected jitters by a pixel.
+    """
+
+    def __init__(
+        self,
+        renderer: _native.Renderer,
+        index: int,
+        poses: tuple[PoseTuple, ...],
+        shape: tuple[int, int, int],
+    ) -> None:
+        self._renderer = renderer
+        self._index = index
+        self._poses = poses
+        self._image = renderer.blank()
+        self._windows: list[Window] = []
+        self.shape = shape
+
+    @property
+    def content(self) -> object:
+        """What drawings of equal pixels have equal: no two frames of a camera have the same noise."""
+        return id(self._renderer), self._index, self._poses
+
+    def part(self, window: Window) -> NDArray[np.uint8]:
+        """Return the whole frame's array, of which `window` at least is drawn."""
+        height, width, _ = self.shape
+        left, top = (max(0, edge // BLOCK_PX * BLOCK_PX) for edge in window[:2])
+        right, bottom = (-(-edge // BLOCK_PX) * BLOCK_PX for edge in window[2:])
+        wanted = (left, top, min(right, width), min(bottom, height))
+        if not any(_holds(drawn, wanted) for drawn in self._windows):
+            self._renderer.draw(self._index, self._poses, wanted, self._image)
+            self._windows.append(wanted)
+        return self._image
+
+    def whole(self) -> NDArray[np.uint8]:
+        """Return the frame, (height, width, 3) uint8 BGR."""
+        return self.part((0, 0, self.shape[1], self.shape[0]))
+
+
+def _holds(drawn: Window, wanted: Window) -> bool:
+    """Return whether one window lies in another; one without pixels lies in any."""
+    if wanted[2] <= wanted[0] or wanted[3] <= wanted[1]:
+        return True
+    begins = drawn[0] <= wanted[0] and drawn[1] <= wanted[1]
+    return begins and drawn[2] >= wanted[2] and drawn[3] >= wanted[3]
 
 
 # The renderer of the last camera, by its configuration: the next run mostly has the same.

@@ -76,6 +76,15 @@ class RimFitter:
     ) -> None: ...
     def fit(self, image: Image, centres_m: Sequence[Point]) -> tuple[Disc, Disc] | None:
         """Return both discs from guesses of their centres; None where one is not there."""
+    def window(self, centre_m: Point, width: int, height: int) -> tuple[int, int, int, int] | None:
+        """Return where in a picture a fit from such a guess mostly looks: left, top, right, bottom."""
+    def fit_within(
+        self,
+        image: Image,
+        centres_m: Sequence[Point],
+        windows: Sequence[tuple[int, int, int, int]],
+    ) -> tuple[tuple[Disc, Disc] | None, bool]:
+        """Return what `fit` does, and whether it looked at a pixel outside of both windows."""
 
 class MarkSearch:
     """Looks for marks in shrunk pictures; `hues` are their directions among the two chromas."""

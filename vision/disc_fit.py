@@ -13,6 +13,7 @@ The sums are compiled from vision/native (`vision._marks`).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,9 @@ from numpy.typing import NDArray
 from vision import _marks
 from vision._marks import Disc as Disc  # noqa: PLC0414 - what a fit returns
 from vision.camera import CameraModel
+
+if TYPE_CHECKING:
+    from hil.core.rig import Picture
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -51,9 +55,19 @@ class RimFitter:
             compiled(model), radius_m, height_m, weights.tolist(), middle_px
         )
 
-    def fit(self, image: Image, centres_m: Sequence[Point]) -> Marks | None:
+    def fit(self, image: Picture, centres_m: Sequence[Point]) -> Marks | None:
         """Return both discs, front first, from guesses of their centres (x, y), m on their plane.
 
         The guess may be off by half of the radius. None where a disc is out of view or has no edge.
+        Of a drawing the parts about the guesses are drawn, and the whole where a fit looks elsewhere.
         """
-        return self._fitter.fit(image, centres_m)
+        if isinstance(image, np.ndarray):
+            return self._fitter.fit(image, centres_m)
+        height, width, _ = image.shape
+        windows = [self._fitter.window(centre, width, height) for centre in centres_m]
+        front, rear = windows
+        if front is None or rear is None:
+            return self._fitter.fit(image.whole(), centres_m)
+        image.part(front)
+        marks, missed = self._fitter.fit_within(image.part(rear), centres_m, (front, rear))
+        return self._fitter.fit(image.whole(), centres_m) if missed else marks

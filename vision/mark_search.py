@@ -104,12 +104,17 @@ class MarkSearch:
                 levels.append(_Level(2**power, bounds))
         return levels
 
+    def seen(self, window: Window) -> Window:
+        """Return the part of the image that a search of a window looks at."""
+        left, top = (edge // self.grid_px * self.grid_px for edge in window[:2])
+        return left, top, window[2], window[3]
+
     def pairs(self, image: Image, window: Window) -> tuple[list[Centres], str]:
         """Return hypotheses (front, rear centre in m), likeliest first; if none, the reason."""
         front: list[_marks.Place] = []
         rear: list[_marks.Place] = []
-        left, top = (edge // self.grid_px * self.grid_px for edge in window[:2])
-        picture, shrink = image[top : window[3], left : window[2]], 1
+        left, top, right, bottom = self.seen(window)
+        picture, shrink = image[top:bottom, left:right], 1
         for level in self._levels:
             while shrink < level.shrink:
                 picture, shrink = _halved(picture), 2 * shrink

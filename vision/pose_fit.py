@@ -22,14 +22,20 @@ def fit_pose(body_m: ArrayLike, world_m: ArrayLike) -> tuple[Pose, float]:
     """
     body = np.asarray(body_m, dtype=np.float64)
     world = np.asarray(world_m, dtype=np.float64)
-    b0, w0 = body.mean(axis=0), world.mean(axis=0)
+    pose, turn, b, w = _fitted(body, world)
+    return pose, float(np.sqrt(np.mean(np.sum((b @ turn.T - w) ** 2, axis=1))))
+
+
+def _fitted(body: Array, world: Array) -> tuple[Pose, Array, Array, Array]:
+    """Return the pose, its rotation, and both patterns about their middles."""
+    b0, w0 = np.add.reduce(body) / len(body), np.add.reduce(world) / len(world)
     b, w = body - b0, world - w0
-    theta = math.atan2(float(np.sum(b[:, 0] * w[:, 1] - b[:, 1] * w[:, 0])), float(np.sum(b * w)))
+    across = np.add.reduce(b[:, 0] * w[:, 1] - b[:, 1] * w[:, 0])
+    theta = math.atan2(float(across), float(np.add.reduce(b * w, axis=None)))
     c, s = math.cos(theta), math.sin(theta)
     turn = np.array([[c, -s], [s, c]])
-    x, y = w0 - turn @ b0
-    rms = float(np.sqrt(np.mean(np.sum((b @ turn.T - w) ** 2, axis=1))))
-    return Pose(float(x), float(y), theta), rms
+    x, y = (w0 - turn @ b0).tolist()
+    return Pose(x, y, theta), turn, b, w
 
 
 def weighted_pose(
@@ -42,7 +48,7 @@ def weighted_pose(
     """
     body, world = np.asarray(body_m, np.float64), np.asarray(world_m, np.float64)
     weight = np.linalg.inv(np.asarray(covariances_m2, np.float64))
-    start, _ = fit_pose(body, world)
+    start = _fitted(body, world)[0]
     x_m, y_m, theta_rad = start.x_m, start.y_m, start.theta_rad
     slopes = np.zeros((len(body), 2, 3))
     slopes[:, 0, 0] = slopes[:, 1, 1] = 1.0

@@ -11,17 +11,13 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from hil.core.types import Pose, PoseMeasurement
 from vision.localisers.marks import SAME_PLACE_M, TWO_PLACES, MarkLocaliser
 from vision.mark_search import Window
 
 if TYPE_CHECKING:
+    from hil.core.rig import Picture
     from vision.tracker import Localiser
-
-Image = NDArray[np.uint8]
 
 # A strip has about this many pixels: those of 640 x 480, which take some 3 ms.
 STRIP_PX = 320_000
@@ -59,7 +55,7 @@ class SpreadSearch:
         self._found: list[PoseMeasurement] = []
 
     def locate(
-        self, image_bgr: Image, predicted: Pose | None, search_radius_m: float
+        self, image_bgr: Picture, predicted: Pose | None, search_radius_m: float
     ) -> PoseMeasurement:
         """Return the pose near a prediction, else what is known from the strips searched so far."""
         if predicted is not None:

@@ -5,18 +5,24 @@ are taken from the truth where the record has it, else from the estimate, and `b
 Commands are held between ticks, so their integrals are step sums; errors are integrated by the
 trapezoidal rule. A figure that does not exist for a run (no sliding variable under PID, never
 settled, fewer than two ticks) is NaN, null in JSON, and does not satisfy a requirement.
+
+A long run's columns are gone through in pieces (`hil.analysis.pieces`): the memory that takes does not
+grow with the run.
 """
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Mapping, Sequence
+import operator
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from hil.analysis import sliding
+from hil.analysis.pieces import percentiles, pieces, row_count
 from hil.analysis.sliding import LawFacts
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME, METRICS, require_known
@@ -28,6 +34,7 @@ if TYPE_CHECKING:
     Columns = Mapping[str, Array]
 
 LAST_S = 1.0  # "over the last second"
+_BANDS = {"settling_50mm_s": 0.050, "settling_20mm_s": 0.020}  # m
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,13 +105,13 @@ def compute(
 
     `law` is what the figures of the sliding term need to know of the law beside its columns.
     """
-    t_s = columns["t_s"]
-    if t_s.size < 2:
-        raise BadInput(f"run record: {t_s.size} rows of samples, the figures need at least 2")
+    rows = row_count(columns)
+    if rows < 2:
+        raise BadInput(f"run record: {rows} rows of samples, the figures need at least 2")
     true_error = has_truth(columns)
     who = "true" if true_error else "est"
     values = (
-        _error_figures(t_s, error_norm(columns))
+        _error_figures(columns)
         | _motion_figures(columns, who)
         | _effort_figures(columns)
         | _sliding_figures(columns)
@@ -121,118 +128,187 @@ def no_figures(columns: Columns) -> Figures:
 
 def has_truth(columns: Columns) -> bool:
     """Say whether the record knows the true state of the robot."""
-    known = np.isfinite(columns["true_delta1_x_m"])
-    return bool(known.size and known.all())
+    name = "true_delta1_x_m"
+    known = [np.isfinite(piece[name]) for piece in pieces(columns, [name])]
+    return bool(sum(part.size for part in known) and all(part.all() for part in known))
 
 
-def error_norm(columns: Columns) -> Array:
-    """Return |delta1| in m at each tick, from the truth where there is one."""
-    return np.hypot(*error_components(columns))
+def error_names(columns: Columns) -> tuple[str, str]:
+    """Return the names of delta1's columns, world X and Y: those of the truth where there is one."""
+    prefix = "true_delta1" if has_truth(columns) else "delta1"
+    return f"{prefix}_x_m", f"{prefix}_y_m"
 
 
 def error_components(columns: Columns) -> tuple[Array, Array]:
     """Return delta1 in m, world X and Y, from the truth where there is one."""
-    prefix = "true_delta1" if has_truth(columns) else "delta1"
-    return columns[f"{prefix}_x_m"], columns[f"{prefix}_y_m"]
+    x_name, y_name = error_names(columns)
+    return columns[x_name], columns[y_name]
 
 
-def settling_time(t_s: Array, error_m: Array, band_m: float) -> float:
-    """Return the time after which the error stays within the band; NaN when it does not."""
-    outside = np.flatnonzero(~(error_m <= band_m))
-    first = int(outside[-1]) + 1 if outside.size else 0
-    return float(t_s[first] - t_s[0]) if first < t_s.size else math.nan
+def _ends(columns: Columns, name: str) -> tuple[float, float]:
+    """Return the first and the last value of a column."""
+    parts = [piece[name] for piece in pieces(columns, [name])]
+    return float(parts[0][0]), float(parts[-1][-1])
 
 
-def _error_figures(t_s: Array, error_m: Array) -> dict[str, float]:
-    since_start_s = t_s - t_s[0]
-    last = t_s >= t_s[-1] - LAST_S
+def _sum(parts: Iterable[float]) -> float:
+    """Add up the sums of the pieces; that of one piece is left as it is."""
+    return float(functools.reduce(operator.add, parts))
+
+
+class _Settling:
+    """From when on the error stays within a band; each piece begins with the row before it."""
+
+    def __init__(self, band_m: float, start_s: float) -> None:
+        self._band_m = band_m
+        self._start_s = start_s
+        self._since_s = start_s
+
+    def take(self, t_s: Array, error_m: Array) -> None:
+        outside = np.flatnonzero(~(error_m <= self._band_m))
+        if outside.size:
+            first = int(outside[-1]) + 1
+            self._since_s = float(t_s[first]) if first < t_s.size else math.nan
+
+    @property
+    def time_s(self) -> float:
+        """NaN when it does not stay."""
+        return self._since_s - self._start_s
+
+
+def _error_figures(columns: Columns) -> dict[str, float]:
+    names = error_names(columns)
+    start_s, end_s = _ends(columns, "t_s")
+    bands = {name: _Settling(band, start_s) for name, band in _BANDS.items()}
+    ise, iae, itae, worst, final = [], [], [], [], math.nan
+    for piece in pieces(columns, ["t_s", *names], before=1):
+        t_s, error_m = piece["t_s"], np.hypot(*(piece[name] for name in names))
+        ise.append(np.trapezoid(error_m**2, t_s))
+        iae.append(np.trapezoid(error_m, t_s))
+        itae.append(np.trapezoid((t_s - start_s) * error_m, t_s))
+        last = error_m[t_s >= end_s - LAST_S]
+        worst += [last.max()] if last.size else []
+        final = float(error_m[-1])
+        for band in bands.values():
+            band.take(t_s, error_m)
     return {
-        "delta1_final_m": float(error_m[-1]),
-        "delta1_worst_last_second_m": float(error_m[last].max()),
-        "ise_m2_s": float(np.trapezoid(error_m**2, t_s)),
-        "iae_m_s": float(np.trapezoid(error_m, t_s)),
-        "itae_m_s2": float(np.trapezoid(since_start_s * error_m, t_s)),
-        "settling_50mm_s": settling_time(t_s, error_m, 0.050),
-        "settling_20mm_s": settling_time(t_s, error_m, 0.020),
-    }
+        "delta1_final_m": final,
+        "delta1_worst_last_second_m": float(np.max(worst)),
+        "ise_m2_s": _sum(ise),
+        "iae_m_s": _sum(iae),
+        "itae_m_s2": _sum(itae),
+    } | {name: band.time_s for name, band in bands.items()}
 
 
 def _motion_figures(columns: Columns, who: str) -> dict[str, float]:
-    x_m, y_m = columns[f"{who}_x_m"], columns[f"{who}_y_m"]
-    theta_rad, t_s = columns[f"{who}_theta_rad"], columns["t_s"]
+    x_name, y_name = f"{who}_x_m", f"{who}_y_m"
+    way_m = [
+        np.hypot(np.diff(piece[x_name]), np.diff(piece[y_name])).sum()
+        for piece in pieces(columns, [x_name, y_name], before=1)
+    ]
+    first_rad, last_rad = _ends(columns, f"{who}_theta_rad")
+    start_s, end_s = _ends(columns, "t_s")
     return {
-        "path_length_m": float(np.hypot(np.diff(x_m), np.diff(y_m)).sum()),
-        "start_offset_x_m": float(error_components(columns)[0][0]),
-        "turn_rad": float(theta_rad[-1] - theta_rad[0]),
-        "duration_s": float(t_s[-1] - t_s[0]),
+        "path_length_m": _sum(way_m),
+        "start_offset_x_m": _ends(columns, error_names(columns)[0])[0],
+        "turn_rad": last_rad - first_rad,
+        "duration_s": end_s - start_s,
     }
 
 
 def _effort_figures(columns: Columns) -> dict[str, float]:
-    dt_s = np.diff(columns["t_s"])
-    u_squared = columns["zeta_m_s2"] ** 2 + columns["u2_m_s2"] ** 2
-    left, right = columns["pwm_left_counts"], columns["pwm_right_counts"]
+    left, right = "pwm_left_counts", "pwm_right_counts"
     return {
-        "control_energy_m2_s3": _held_integral(u_squared, dt_s),
-        "pwm_energy_counts2_s": _held_integral(left**2 + right**2, dt_s),
-        "eta1_variation_m_s": _variation(columns["eta1_cmd_m_s"]),
-        "theta_dot_variation_rad_s": _variation(columns["theta_dot_cmd_rad_s"]),
-        "pwm_variation_counts": _variation(left) + _variation(right),
-        "saturated_share": _mean(columns["saturated"][sliding.law_ran(columns)]),
+        "control_energy_m2_s3": _held_integral(columns, "zeta_m_s2", "u2_m_s2"),
+        "pwm_energy_counts2_s": _held_integral(columns, left, right),
+        "eta1_variation_m_s": _variation(columns, "eta1_cmd_m_s"),
+        "theta_dot_variation_rad_s": _variation(columns, "theta_dot_cmd_rad_s"),
+        "pwm_variation_counts": _variation(columns, left) + _variation(columns, right),
+        "saturated_share": _mean_of_ran(columns, "saturated"),
     }
 
 
 def _sliding_figures(columns: Columns) -> dict[str, float]:
-    ran = sliding.law_ran(columns)
-    t_s, inside = columns["t_s"], columns["in_layer"]
-    known = np.isfinite(inside)
-    changes = _sign_changes(columns["s_x_m_s2"][ran]) + _sign_changes(columns["s_y_m_s2"][ran])
-    ran_s = float(np.diff(t_s)[ran[:-1]].sum())
-    reached = np.flatnonzero(inside == 1.0)
+    changes = _sign_changes(columns, "s_x_m_s2") + _sign_changes(columns, "s_y_m_s2")
+    ran_s, known, reached_s = [], False, math.nan
+    start_s, _ = _ends(columns, "t_s")
+    for piece in pieces(columns, ["t_s", "in_layer", *sliding.RESTING], before=1):
+        t_s, inside = piece["t_s"], piece["in_layer"]
+        ran_s.append(np.diff(t_s)[sliding.law_ran(piece)[:-1]].sum())
+        known = known or bool(np.isfinite(inside).any())
+        reached = np.flatnonzero(inside == 1.0)
+        if reached.size and math.isnan(reached_s):
+            reached_s = float(t_s[reached[0]] - start_s)
+    in_all_s = _sum(ran_s)
     return {
-        "s_sign_changes_hz": changes / ran_s if known.any() and ran_s > 0.0 else math.nan,
-        "in_layer_share": _mean(inside[ran]),
-        "reaching_s": float(t_s[reached[0]] - t_s[0]) if reached.size else math.nan,
+        "s_sign_changes_hz": changes / in_all_s if known and in_all_s > 0.0 else math.nan,
+        "in_layer_share": _mean_of_ran(columns, "in_layer"),
+        "reaching_s": reached_s,
     }
 
 
 def _timing_figures(columns: Columns, link: LinkStats) -> dict[str, float]:
+    rtt_s = _percentiles(columns, "rtt_s")
+    to_actuation_s = _percentiles(columns, "exposure_to_actuation_s")
+    misses = [np.nansum(p["deadline_miss"]) for p in pieces(columns, ["deadline_miss"])]
     return {
         "link_loss_ratio": link.loss_ratio,
-        "rtt_median_s": _percentile(columns["rtt_s"], 50),
-        "rtt_p99_s": _percentile(columns["rtt_s"], 99),
-        "exposure_to_actuation_median_s": _percentile(columns["exposure_to_actuation_s"], 50),
-        "exposure_to_actuation_p99_s": _percentile(columns["exposure_to_actuation_s"], 99),
-        "deadline_misses": float(np.nansum(columns["deadline_miss"])),
+        "rtt_median_s": rtt_s[0],
+        "rtt_p99_s": rtt_s[1],
+        "exposure_to_actuation_median_s": to_actuation_s[0],
+        "exposure_to_actuation_p99_s": to_actuation_s[1],
+        "deadline_misses": _sum(misses),
     }
 
 
-def _held_integral(values: Array, dt_s: Array) -> float:
-    """Integrate a signal that is held from each tick to the next; unknown values count as zero."""
-    held = values[:-1] * dt_s
-    return float(np.nansum(held)) if np.isfinite(held).any() else math.nan
+def _held_integral(columns: Columns, one: str, other: str) -> float:
+    """Integrate the squares of two signals that are held from tick to tick; unknown ones are zero."""
+    sums, known = [], False
+    for piece in pieces(columns, ["t_s", one, other], before=1):
+        squares = piece[one] ** 2 + piece[other] ** 2
+        held = squares[:-1] * np.diff(piece["t_s"])
+        sums.append(np.nansum(held))
+        known = known or bool(np.isfinite(held).any())
+    return _sum(sums) if known else math.nan
 
 
-def _variation(values: Array) -> float:
+def _variation(columns: Columns, name: str) -> float:
     """Return the sum of |change| between successive known values."""
-    known = values[np.isfinite(values)]
-    return float(np.abs(np.diff(known)).sum()) if known.size else math.nan
+    sums, before = [], np.empty(0)
+    for piece in pieces(columns, [name]):
+        values = piece[name]
+        known = np.concatenate((before, values[np.isfinite(values)]))
+        sums.append(np.abs(np.diff(known)).sum())
+        before = known[-1:]
+    return _sum(sums) if before.size else math.nan
 
 
-def _sign_changes(values: Array) -> int:
-    """Count the changes of sign, passing over zeros and unknown values."""
-    signs = np.sign(values[np.isfinite(values) & (values != 0.0)])
-    return int(np.count_nonzero(np.diff(signs)))
+def _sign_changes(columns: Columns, name: str) -> int:
+    """Count the changes of sign while the law ran, passing over zeros and unknown values."""
+    count, before = 0, np.empty(0)
+    for piece in pieces(columns, [name, *sliding.RESTING]):
+        values = piece[name][sliding.law_ran(piece)]
+        signs = np.sign(values[np.isfinite(values) & (values != 0.0)])
+        signs = np.concatenate((before, signs))
+        count += int(np.count_nonzero(np.diff(signs)))
+        before = signs[-1:]
+    return count
 
 
-def _mean(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if known.size else math.nan
+def _mean_of_ran(columns: Columns, name: str) -> float:
+    """Return the mean of the known values while the law ran."""
+    sums, count = [], 0
+    for piece in pieces(columns, [name, *sliding.RESTING]):
+        values = piece[name][sliding.law_ran(piece)]
+        known = values[np.isfinite(values)]
+        sums.append(known.sum())
+        count += known.size
+    return _sum(sums) / count if count else math.nan
 
 
-def _percentile(values: Array, percent: float) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.percentile(known, percent)) if known.size else math.nan
+def _percentiles(columns: Columns, name: str) -> list[float]:
+    """Return median and 99th percentile of the known values."""
+    return percentiles(lambda: (piece[name] for piece in pieces(columns, [name])), [50, 99])
 
 
 def _finite(value: float) -> float | None:

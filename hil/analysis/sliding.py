@@ -14,11 +14,13 @@ over one tick the estimate's noise would be most of it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from hil.analysis.pieces import median, percentiles, pieces, row_count
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -33,7 +35,7 @@ GAIN_RATIO = 2.0
 IN_LAYER_SHARE = 0.99
 
 # A command of the control stop: the law did not run in this tick.
-_RESTING = ("v1_m_s3", "u2_m_s2", "zeta_m_s2", "eta1_cmd_m_s", "theta_dot_cmd_rad_s")
+RESTING = ("v1_m_s3", "u2_m_s2", "zeta_m_s2", "eta1_cmd_m_s", "theta_dot_cmd_rad_s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +64,7 @@ class LawFacts:
 
 def law_ran(columns: Columns) -> NDArray[np.bool_]:
     """Return at which ticks the law ran: all but those in which the control stop commands rest."""
-    resting: NDArray[np.bool_] = np.all([columns[name] == 0.0 for name in _RESTING], axis=0)
+    resting: NDArray[np.bool_] = np.all([columns[name] == 0.0 for name in RESTING], axis=0)
     return ~resting
 
 
@@ -71,66 +73,133 @@ def disturbance(columns: Columns, who: str, d0_m: float) -> Array:
 
     `who` is the prefix of the columns of motion: "true" or "est". Empty below nine such ticks.
     """
-    t_s = columns["t_s"]
-    tick_s = float(np.median(np.diff(t_s)))
+    found = list(_disturbances(columns, who, d0_m))
+    return np.concatenate(found) if found else np.empty(0)
+
+
+def _disturbances(columns: Columns, who: str, d0_m: float) -> Iterator[Array]:
+    """Yield `disturbance` piece by piece."""
+    tick_s = median(lambda: (np.diff(p["t_s"]) for p in pieces(columns, ["t_s"], before=1)))
     half = max(round(HALF_SPAN_S / tick_s), 1)
-    if t_s.size <= 4 * half or not math.isfinite(d0_m):
-        return np.empty(0)
-    eta1, w = columns[f"{who}_eta1_m_s"], columns[f"{who}_theta_dot_rad_s"]
-    a1 = _slope(eta1, half, tick_s) - _mean_around(columns["zeta_m_s2"], half)
-    a_w = _slope(w, half, tick_s) + _mean_around(columns["u2_m_s2"], half) / d0_m
+    if row_count(columns) <= 4 * half or not math.isfinite(d0_m):
+        return
+    names = ["t_s", f"{who}_eta1_m_s", f"{who}_theta_dot_rad_s", *RESTING]
+    for piece in pieces(columns, names, before=4 * half):
+        eta1, w = piece[names[1]], piece[names[2]]
+        if eta1.size > 4 * half:
+            yield _disturbance(eta1, w, piece, d0_m, half, tick_s)
+
+
+def _disturbance(
+    eta1: Array, w: Array, piece: Columns, d0_m: float, half: int, tick_s: float
+) -> Array:
+    a1 = _slope(eta1, half, tick_s) - _mean_around(piece["zeta_m_s2"], half)
+    a_w = _slope(w, half, tick_s) + _mean_around(piece["u2_m_s2"], half) / d0_m
     inner = slice(2 * half, -2 * half)
     along = _slope(a1, half, tick_s)
     across = 2.0 * w[inner] * a1[half:-half] + eta1[inner] * a_w[half:-half]
-    whole = _mean_around(law_ran(columns).astype(float), 2 * half) > 1.0 - 1e-9
+    whole = _mean_around(law_ran(piece).astype(float), 2 * half) > 1.0 - 1e-9
     size = np.hypot(along, across)
     return size[whole & np.isfinite(size)]
 
 
 def figures(columns: Columns, who: str, facts: LawFacts) -> dict[str, float]:
     """Return the figures of the sliding term; NaN for a law without a sliding variable."""
-    ran = law_ran(columns)
-    s, eps = np.hypot(columns["s_x_m_s2"], columns["s_y_m_s2"])[ran], columns["eps_m_s2"][ran]
-    size = disturbance(columns, who, facts.d0_m) if np.isfinite(s).any() else np.empty(0)
-    middle, bound, most = np.percentile(size, [50, 90, 100]) if size.size else (math.nan,) * 3
+    ticks = _Ticks(columns, facts)
+    sizes = lambda: _disturbances(columns, who, facts.d0_m) if ticks.any_s else iter(())  # noqa: E731
+    middle, bound, most = percentiles(sizes, [50, 90, 100])
     ratio = facts.alpha_m_s3 / bound if bound > 0.0 else math.nan
-    layered = s.size > 0 and bool(np.isfinite(s + eps).all())
-    inside = float(np.mean(s <= eps)) if layered else math.nan
-    thin = bool(layered and (eps < facts.accel_max_m_s2).all())
-    acts = ratio >= GAIN_RATIO and inside >= IN_LAYER_SHARE and thin
+    layered = ticks.layered
+    inside = ticks.inside / ticks.ran if layered else math.nan
+    acts = ratio >= GAIN_RATIO and inside >= IN_LAYER_SHARE and layered and ticks.thin
     known = layered and math.isfinite(ratio)
+    ratios = lambda: (s / eps for _, s, eps in _layers(columns))  # noqa: E731
     return {
-        "law_ticks": float(np.count_nonzero(ran)),
-        "disturbance_median_m_s3": float(middle),
-        "disturbance_90_m_s3": float(bound),
-        "disturbance_max_m_s3": float(most),
+        "law_ticks": float(ticks.ran),
+        "disturbance_median_m_s3": middle,
+        "disturbance_90_m_s3": bound,
+        "disturbance_max_m_s3": most,
         "alpha_over_d90_ratio": float(ratio),
-        "s_over_eps_median_ratio": float(np.median(s / eps)) if layered else math.nan,
-        "sliding_term_share": _share(columns, ran, facts) if size.size else math.nan,
-        "s_settling_s": _settling(columns["t_s"][ran], s <= eps) if layered else math.nan,
+        "s_over_eps_median_ratio": median(ratios) if layered else math.nan,
+        "sliding_term_share": _share(columns, facts) if math.isfinite(most) else math.nan,
+        "s_settling_s": ticks.settling_s if layered else math.nan,
         "sliding_acts": float(acts) if known else math.nan,
     }
 
 
-def _share(columns: Columns, ran: NDArray[np.bool_], facts: LawFacts) -> float:
+def _layers(columns: Columns) -> Iterator[tuple[Array, Array, Array]]:
+    """Yield time, ||s|| and eps of the ticks in which the law ran, piece by piece."""
+    for piece in pieces(columns, ["t_s", "s_x_m_s2", "s_y_m_s2", "eps_m_s2", *RESTING]):
+        ran = law_ran(piece)
+        s = np.hypot(piece["s_x_m_s2"], piece["s_y_m_s2"])
+        yield piece["t_s"][ran], s[ran], piece["eps_m_s2"][ran]
+
+
+class _Ticks:
+    """What is counted over the ticks in which the law ran."""
+
+    def __init__(self, columns: Columns, facts: LawFacts) -> None:
+        self.ran = self.inside = 0
+        self.any_s, self.thin, self._finite = False, True, True
+        start_s = since_s = math.nan  # of the first tick; from which on ||s|| <= eps
+        outside = True
+        for t_s, s, eps in _layers(columns):
+            self.ran += s.size
+            self.any_s = self.any_s or bool(np.isfinite(s).any())
+            self._finite = self._finite and bool(np.isfinite(s + eps).all())
+            self.thin = self.thin and bool((eps < facts.accel_max_m_s2).all())
+            within = s <= eps
+            self.inside += int(np.count_nonzero(within))
+            if not s.size:
+                continue
+            start_s = float(t_s[0]) if math.isnan(start_s) else start_s
+            beyond = np.flatnonzero(~within)
+            first = int(beyond[-1]) + 1 if beyond.size else 0
+            if beyond.size or outside:
+                since_s = float(t_s[first]) if first < t_s.size else math.nan
+            outside = first == t_s.size
+        self.settling_s = since_s - start_s  # NaN where it never stays within
+        self.layered = self.ran > 0 and self._finite
+
+
+def _share(columns: Columns, facts: LawFacts) -> float:
     """Return the median share of the sliding term in the jerk commanded.
 
     ||term|| / (||term|| + ||rest||), the rest being what the command has beside it. The term is
     alpha s/(||s|| + eps), or what the law's own columns say.
     """
-    term_x, term_y = (values[ran] for values in _terms(columns, facts))
-    v1, u2, zeta = (columns[name][ran] for name in ("v1_m_s3", "u2_m_s2", "zeta_m_s2"))
+    own = ["slide_x_m_s3", "slide_y_m_s3"] if "slide_x_m_s3" in columns else []
+    names = [*_OF_SHARE, *own, *RESTING]
+    parts = lambda: (_shares(piece, facts) for piece in pieces(columns, names))  # noqa: E731
+    if not any(np.isfinite(both).any() for _, both in parts()):
+        return math.nan
+    return median(lambda: (share[~np.isnan(share)] for share, _ in parts()))
+
+
+_OF_SHARE = (
+    "s_x_m_s2",
+    "s_y_m_s2",
+    "eps_m_s2",
+    "est_theta_rad",
+    "est_eta1_m_s",
+    "est_theta_dot_rad_s",
+)
+
+
+def _shares(piece: Columns, facts: LawFacts) -> tuple[Array, Array]:
+    """Return the shares at the ticks in which the law ran, and the sizes that they are parts of."""
+    ran = law_ran(piece)
+    term_x, term_y = (values[ran] for values in _terms(piece, facts))
+    v1, u2, zeta = (piece[name][ran] for name in ("v1_m_s3", "u2_m_s2", "zeta_m_s2"))
     theta, eta1, w = (
-        columns[f"est_{name}"][ran] for name in ("theta_rad", "eta1_m_s", "theta_dot_rad_s")
+        piece[f"est_{name}"][ran] for name in ("theta_rad", "eta1_m_s", "theta_dot_rad_s")
     )
     along, across = v1 - eta1 * w * w, 2.0 * zeta * w - eta1 * u2 / facts.d0_m  # A + B v
     cos, sin = np.cos(theta), np.sin(theta)
     term = np.hypot(term_x, term_y)
     rest = np.hypot(cos * along - sin * across - term_x, sin * along + cos * across - term_y)
     both = term + rest
-    if not np.isfinite(both).any():
-        return math.nan
-    return float(np.nanmedian(np.divide(term, both, out=np.zeros_like(term), where=both > 0.0)))
+    return np.divide(term, both, out=np.zeros_like(term), where=both > 0.0), both
 
 
 def _terms(columns: Columns, facts: LawFacts) -> tuple[Array, Array]:
@@ -140,13 +209,6 @@ def _terms(columns: Columns, facts: LawFacts) -> tuple[Array, Array]:
     s_x, s_y = columns["s_x_m_s2"], columns["s_y_m_s2"]
     pull = -facts.alpha_m_s3 / (np.hypot(s_x, s_y) + columns["eps_m_s2"])
     return pull * s_x, pull * s_y
-
-
-def _settling(t_s: Array, inside: NDArray[np.bool_]) -> float:
-    """Return the time from the first tick of the law after which ||s|| <= eps; NaN where never."""
-    outside = np.flatnonzero(~inside)
-    first = int(outside[-1]) + 1 if outside.size else 0
-    return float(t_s[first] - t_s[0]) if first < t_s.size else math.nan
 
 
 def _slope(values: Array, half: int, tick_s: float) -> Array:

@@ -103,7 +103,7 @@ class Scenario(Section):
 
     name: PlainName = Field(min_length=1, max_length=80, description="names the record's folder")
     description: str = Field("", description="one sentence for the reports")
-    duration_s: float = quantity("s", "length of the controlled part", gt=0, le=3600)
+    duration_s: float = quantity("s", "length of the controlled part", gt=0, le=36_000)
     start: StartPose
     reference: SerializeAsAny[ReferenceConfig]
     requirements: tuple[Requirement, ...] = ()

@@ -56,20 +56,53 @@ def discard_unsent(stream: ByteStream) -> None:
         stream.discard_unsent()
 
 
+class Drawing(Protocol):
+    """A picture of a simulated camera that is drawn only where somebody looks; to be read in one thread."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, 3)."""
+
+    @property
+    def content(self) -> object:
+        """What drawings of equal pixels have equal."""
+
+    def part(self, window: tuple[int, int, int, int]) -> NDArray[np.uint8]:
+        """Return the whole picture's array, of which (left, top, right, bottom) at least is drawn."""
+
+    def whole(self) -> NDArray[np.uint8]:
+        """Return the picture, (H, W, 3) uint8 BGR."""
+
+
+if TYPE_CHECKING:
+    Picture = NDArray[np.uint8] | Drawing
+
+
+def whole(picture: Picture) -> NDArray[np.uint8]:
+    """Return a picture with all its pixels, (H, W, 3) uint8 BGR."""
+    return picture if hasattr(picture, "tobytes") else picture.whole()
+
+
 @dataclass(frozen=True, slots=True)
 class Frame:
     """One camera frame as it reached the host.
 
-    `t_cam_s` is the middle of the exposure on the camera's own clock. `image` is (H, W, 3) uint8
-    BGR; it is None when the source gives poses itself (`--camera pose`), and `pose` is set then.
-    `note` is what a camera has to say of itself since the frame before, for the record; "" mostly.
+    `t_cam_s` is the middle of the exposure on the camera's own clock. `picture` is (H, W, 3) uint8
+    BGR, or a drawing of that; it is None when the source gives poses itself (`--camera pose`), and
+    `pose` is set then. `note` is what a camera has to say of itself since the frame before, for the
+    record; "" mostly.
     """
 
     index: int
     t_cam_s: float
-    image: NDArray[np.uint8] | None
+    picture: Picture | None
     pose: PoseMeasurement | None = None
     note: str = ""
+
+    @property
+    def image(self) -> NDArray[np.uint8] | None:
+        """The picture with all its pixels, (H, W, 3) uint8 BGR."""
+        return None if self.picture is None else whole(self.picture)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,11 +13,14 @@ from typing import TYPE_CHECKING
 import cv2
 
 from hil.core.errors import RecordFault
+from hil.core.rig import whole
 from hil.record.reader import picture_name
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+    from hil.core.rig import Picture
 
     Image = NDArray[np.uint8]
 
@@ -50,20 +53,20 @@ class CameraKeeper:
         self._video_path = video
         self._writer: cv2.VideoWriter | None = None
         self._next_picture_s = float("-inf")
-        self._newest: tuple[float, Image] | None = None
+        self._newest: tuple[float, Picture] | None = None
         self.error = ""
         self._queue: queue.Queue[tuple[float, Image, bool] | None] = queue.Queue(_QUEUE_FRAMES)
         self._thread = threading.Thread(target=self._work, name="camera-keeper", daemon=True)
         self._thread.start()
 
-    def take(self, t_s: float, image: Image) -> None:
+    def take(self, t_s: float, image: Picture) -> None:
         """Hand one frame over; waits only when the encoder is 256 frames behind."""
         keep = t_s >= self._next_picture_s
         if keep:
             self._next_picture_s = t_s + self._period_s
         self._newest = None if keep else (t_s, image)
         if keep or self._video_path is not None:
-            self._queue.put((t_s, image, keep))
+            self._queue.put((t_s, whole(image), keep))
 
     def close(self) -> None:
         """Encode what is waiting and the newest frame; raises RecordFault when the video failed."""
@@ -72,7 +75,8 @@ class CameraKeeper:
         self._queue.put(None)
         self._thread.join()
         if self._newest is not None:
-            self._keep(*self._newest)
+            t_s, image = self._newest
+            self._keep(t_s, whole(image))
         if self.error:
             raise RecordFault(self.error)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -14,8 +15,7 @@ from hil.record.reader import Event, RunRecord
 from hil.record.schema import FRAME_NAMES
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from hil.core.rig import Picture
     from hil.record.journal import Columns
     from hil.record.manifest import Manifest, Outcome
 
@@ -33,7 +33,7 @@ class RunSink(Protocol):
     def append(self, row: Sequence[float]) -> None:
         """Take one outer tick in the order of the manifest's sample_names."""
 
-    def frame(self, row: Sequence[float], image: NDArray[np.uint8] | None = None) -> None:
+    def frame(self, row: Sequence[float], image: Picture | None = None) -> None:
         """Take one camera frame in the order of schema.FRAME_NAMES, and its image."""
 
     def event(self, t_s: float, kind: str, text: str) -> None:
@@ -43,16 +43,48 @@ class RunSink(Protocol):
         """Take who the board said it is."""
 
 
+class Rows:
+    """A table as one typed array, 8 bytes a value: a tuple of numbers takes four times that."""
+
+    def __init__(self, width: int) -> None:
+        self._width = width
+        self._values = array("d")
+
+    def append(self, row: Sequence[float]) -> None:
+        """Take one row; raises ValueError for one of another width."""
+        if len(row) != self._width:
+            raise ValueError(f"a row of {len(row)} values, the table has {self._width} columns")
+        self._values.extend(row)
+
+    def __len__(self) -> int:
+        """Return how many rows there are."""
+        return len(self._values) // self._width
+
+    def __getitem__(self, place: int) -> Sequence[float]:
+        """Return one row, from the end for a place below 0."""
+        place = range(len(self))[place]
+        return self._values[place * self._width : (place + 1) * self._width]
+
+    def columns(self, names: Sequence[str]) -> Columns:
+        """Return the table by column."""
+        table = np.frombuffer(self._values, np.float64).reshape(len(self), self._width)
+        return {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(names)}
+
+
 @dataclass(slots=True)
 class MemoryRecorder:
     """Keeps rows as they come; images are not kept, link frames only with `keep_link`."""
 
     manifest: Manifest
     keep_link: bool = False
-    rows: list[Sequence[float]] = field(default_factory=list)
-    frames: list[Sequence[float]] = field(default_factory=list)
+    rows: Rows = field(init=False)
+    frames: Rows = field(default_factory=lambda: Rows(len(FRAME_NAMES)))
     events: list[Event] = field(default_factory=list)
     link_frames: list[tuple[float, bytes]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Make room for the columns that the manifest names."""
+        self.rows = Rows(len(self.manifest.sample_names))
 
     def start(self, unix_us: int) -> None:
         """Leave the manifest's wall time: a replay's is that of its record."""
@@ -61,7 +93,7 @@ class MemoryRecorder:
         """Take one outer tick in the order of the manifest's sample_names."""
         self.rows.append(row)
 
-    def frame(self, row: Sequence[float], image: NDArray[np.uint8] | None = None) -> None:  # noqa: ARG002
+    def frame(self, row: Sequence[float], image: Picture | None = None) -> None:  # noqa: ARG002
         """Take one camera frame in the order of schema.FRAME_NAMES."""
         self.frames.append(row)
 
@@ -98,12 +130,7 @@ class MemoryRecorder:
         return RunRecord(
             path=Path(),
             manifest=self.manifest.model_copy(update=ended),
-            samples=_columns(self.manifest.sample_names, self.rows),
-            frames=_columns(FRAME_NAMES, self.frames),
+            samples=self.rows.columns(self.manifest.sample_names),
+            frames=self.frames.columns(FRAME_NAMES),
             events=tuple(self.events),
         )
-
-
-def _columns(names: Sequence[str], rows: Sequence[Sequence[float]]) -> Columns:
-    table = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
-    return {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(names)}

@@ -5,12 +5,13 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from hil.analysis import metrics
+from hil.analysis.pieces import row_count
 from hil.analysis.sliding import LawFacts
 from hil.core.errors import BadInput
 from hil.record import layout
@@ -51,6 +52,9 @@ class RunRecord:
     events: tuple[Event, ...] = ()
     pictures: tuple[Picture, ...] = ()
     problems: tuple[str, ...] = ()
+    _figures: list[metrics.Figures] = field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
 
     @property
     def label(self) -> str:
@@ -75,9 +79,13 @@ class RunRecord:
 
     def figures(self) -> metrics.Figures:
         """Return the figures, computed from the samples; all are NaN below two ticks."""
-        if self.samples["t_s"].size < 2:
-            return metrics.no_figures(self.samples)
-        return metrics.compute(self.samples, self.link_stats(), self.law_facts())
+        if not self._figures:
+            self._figures.append(
+                metrics.no_figures(self.samples)
+                if row_count(self.samples) < 2
+                else metrics.compute(self.samples, self.link_stats(), self.law_facts())
+            )
+        return self._figures[0]
 
     def verdicts(self) -> tuple[metrics.Verdict, ...]:
         """Return the verdict on each requirement of the scenario."""

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.analysis import metrics
+from hil.analysis.pieces import row_count
 from hil.core.errors import BadInput, RecordFault
 from hil.core.files import PART, replace_file
 from hil.record import layout
@@ -24,8 +25,7 @@ from hil.record.tlog import TlogWriter
 from hil.record.writing import GuardedFile, Keeping
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    from hil.core.rig import Picture
 
 _FLUSH_PERIOD_S = 1.0
 _PICTURE_PERIOD_S = 0.5
@@ -123,7 +123,7 @@ class Recorder:
             self._next_flush_s = row[0] + _FLUSH_PERIOD_S
             self.flush()
 
-    def frame(self, row: Sequence[float], image: NDArray[np.uint8] | None = None) -> None:
+    def frame(self, row: Sequence[float], image: Picture | None = None) -> None:
         """Append one camera frame, values in the order of schema.FRAME_NAMES, and its image.
 
         The image (H, W, 3) uint8 BGR must not be changed afterwards: it is encoded later.
@@ -220,7 +220,7 @@ class Recorder:
         ended = {
             "outcome": outcome,
             "outcome_detail": detail,
-            "tick_count": int(samples["t_s"].size),
+            "tick_count": row_count(samples),
             "link": {key: float(value) for key, value in dataclasses.asdict(stats).items()},
         }
         run = RunRecord(

@@ -8,7 +8,7 @@ seen from above). Times are seconds since the first tick of the controlled part;
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,10 +18,12 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from hil.analysis import metrics
-from hil.core.files import replace_file
+from hil.analysis.pieces import PIECE_ROWS, pieces, row_count
+from hil.core.files import replacing
 from hil.core.registries import OUTER_LAWS
 from hil.core.text import visible
 from hil.record.reader import RunRecord
+from hil.record.rrd_file import Put, written_by
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from hil.record.journal import Columns
 
     Array = NDArray[np.float64]
+    Times = Array | list[float]
 
 Colour = tuple[int, int, int]
 TIMELINE = "t"
@@ -40,6 +43,8 @@ _LINE_COLOURS = ((230, 230, 230), (86, 180, 233), (230, 159, 0), (0, 158, 115))
 _GREY = (140, 140, 140)
 _FRONT, _REAR = (255, 255, 255), (255, 221, 0)
 _MARKS = ("front_u_px", "front_v_px", "rear_u_px", "rear_v_px")
+_DERIVED = ("error_x_m", "error_y_m", "error_norm_m")
+_PICTURES_AT_ONCE = 32
 _GRAVE = {"fault", "stop"}
 _EYE_HALF_ANGLE_RAD = math.radians(27.0)
 
@@ -103,23 +108,23 @@ _MAIN_PLOTS = ("error", "sliding", "wheels", "latency")
 
 def write_rrd(path: Path, runs: Sequence[RunRecord]) -> None:
     """Write the runs to one Rerun file, atomically; the first run's name titles the recording."""
-    replace_file(path, _in_bytes(runs, entity_names(runs)))
-
-
-def _in_bytes(runs: Sequence[RunRecord], names: Sequence[str]) -> bytes:
-    """Return the file's content: Rerun's own writer waits for ever once a file cannot be written."""
+    names = entity_names(runs)
     recording = rr.RecordingStream(APPLICATION, recording_id=_recording_id(runs))
-    memory = recording.memory_recording()
-    recording.send_blueprint(blueprint(runs, names), make_active=False)
-    recording.send_recording_name(" and ".join(names))
+    with replacing(path) as part, written_by(recording, part) as put:
+        recording.send_blueprint(blueprint(runs, names), make_active=False)
+        recording.send_recording_name(" and ".join(names))
+        _send_all(recording, runs, names, put)
+
+
+def _send_all(
+    recording: rr.RecordingStream, runs: Sequence[RunRecord], names: Sequence[str], put: Put
+) -> None:
     one_scenario = len({run.manifest.scenario_name for run in runs}) == 1
     legends = [f"{name.rpartition('/')[2] if one_scenario else name} " for name in names]
     for index, (name, run) in enumerate(zip(names, runs, strict=True)):
         colour = _colour(run, index, runs)
         prefix, lines = ("", _LINE_COLOURS) if len(runs) == 1 else (legends[index], _shades(colour))
-        _Sender(recording, name, run, colour).send(_LineStyle(prefix, lines))
-    recording.flush()
-    return bytes(memory.drain_as_bytes())
+        _Sender(recording, name, run, colour, put).send(_LineStyle(prefix, lines))
 
 
 def entity_names(runs: Sequence[RunRecord]) -> list[str]:
@@ -157,111 +162,148 @@ def _on_floor(x_m: Array, y_m: Array, z_m: float = 0.001) -> Array:
 
 
 class _Sender:
-    """Sends one run to the recording, every signal under the entity `name`."""
+    """Sends one run to the recording, every signal under the entity `name`, piece by piece.
+
+    `put` writes what has been sent; it is called often enough that little is held.
+    """
 
     def __init__(
-        self, recording: rr.RecordingStream, name: str, run: RunRecord, colour: Colour
+        self,
+        recording: rr.RecordingStream,
+        name: str,
+        run: RunRecord,
+        colour: Colour,
+        put: Put,
     ) -> None:
         self._recording = recording
         self._name = name
         self._run = run
         self._colour = colour
-        self._ticks = [rr.TimeColumn(TIMELINE, duration=run.samples["t_s"])]
+        self._put = put
 
     def _log_static(self, entity: str, *what: rr.AsComponents) -> None:
         self._recording.log(f"{self._name}/{entity}", *what, static=True)
 
+    def _send(self, entity: str, t_s: Times, what: rr.ComponentColumnList) -> None:
+        time = [rr.TimeColumn(TIMELINE, duration=t_s)]
+        self._recording.send_columns(f"{self._name}/{entity}", time, what)
+
+    def _pieces(self, names: Sequence[str]) -> Iterator[Columns]:
+        """Yield columns of the samples in pieces, the errors of the charts worked out among them."""
+        error = metrics.error_names(self._run.samples)
+        recorded = [name for name in names if name not in _DERIVED]
+        for piece in pieces(self._run.samples, ["t_s", *dict.fromkeys((*recorded, *error))]):
+            x_m, y_m = (piece[name] for name in error)
+            yield piece | {"error_x_m": x_m, "error_y_m": y_m, "error_norm_m": np.hypot(x_m, y_m)}
+            self._put()
+
     def send(self, style: _LineStyle) -> None:
         """Send floor plan, charts, camera and events."""
-        samples = self._run.samples
-        if samples["t_s"].size > 0:
-            self._floor(samples)
-            x_m, y_m = metrics.error_components(samples)
-            norm_m = np.hypot(x_m, y_m)
-            derived = {"error_x_m": x_m, "error_y_m": y_m, "error_norm_m": norm_m}
+        if row_count(self._run.samples) > 0:
+            self._floor()
             for plot in (*PLOTS, *own_plots(self._run)):
-                lines = {
-                    name: derived[name] if name in derived else samples[name]
-                    for _, name, _ in plot.lines
-                }
-                self._plot(plot, lines, style)
+                self._plot(plot, style)
         if self._run.pictures:
             self._camera()
         if self._run.events:
             self._events()
 
-    def _floor(self, samples: Columns) -> None:
-        who = "true" if metrics.has_truth(samples) else "est"
-        x_m, y_m, theta_rad = (samples[f"{who}_{key}"] for key in ("x_m", "y_m", "theta_rad"))
-        known = np.isfinite(x_m)
-        path = rr.LineStrips3D(
-            [_on_floor(x_m[known], y_m[known])], colors=self._colour, radii=0.003
+    def _floor(self) -> None:
+        who = "true" if metrics.has_truth(self._run.samples) else "est"
+        at = (f"{who}_x_m", f"{who}_y_m")
+        path = self._line(*at)
+        self._log_static(
+            "floor/path",
+            rr.LineStrips3D([path[np.isfinite(path[:, 0])]], colors=self._colour, radii=0.003),
         )
-        self._log_static("floor/path", path)
-        self._reference(samples)
+        self._reference()
         body = rr.Boxes3D(sizes=[_BODY_M], colors=self._colour, labels=[self._run.manifest.outer])
         heading = rr.Arrows3D(vectors=[(0.14, 0.0, 0.0)], colors=self._colour, radii=0.006)
         self._log_static("floor/robot", body, heading)
-        half = np.nan_to_num(theta_rad) / 2.0
-        zero = np.zeros_like(half)
-        poses = rr.Transform3D.columns(
-            translation=_on_floor(np.nan_to_num(x_m), np.nan_to_num(y_m), _BODY_M[2] / 2),
-            quaternion=np.column_stack((zero, zero, np.sin(half), np.cos(half))),
-        )
-        self._recording.send_columns(f"{self._name}/floor/robot", self._ticks, poses)
+        for piece in self._pieces([*at, f"{who}_theta_rad"]):
+            x_m, y_m, theta_rad = (np.nan_to_num(piece[k]) for k in (*at, f"{who}_theta_rad"))
+            half, zero = theta_rad / 2.0, np.zeros_like(theta_rad)
+            poses = rr.Transform3D.columns(
+                translation=_on_floor(x_m, y_m, _BODY_M[2] / 2),
+                quaternion=np.column_stack((zero, zero, np.sin(half), np.cos(half))),
+            )
+            self._send("floor/robot", piece["t_s"], poses)
         if who == "true":
             self._log_static("floor/estimate", rr.Points3D.from_fields(colors=_GREY, radii=0.008))
-            seen = rr.Points3D.columns(
-                positions=_on_floor(samples["est_x_m"], samples["est_y_m"], 0.07)
-            )
-            self._recording.send_columns(f"{self._name}/floor/estimate", self._ticks, seen)
+            for piece in self._pieces(["est_x_m", "est_y_m"]):
+                seen = _on_floor(piece["est_x_m"], piece["est_y_m"], 0.07)
+                self._send("floor/estimate", piece["t_s"], rr.Points3D.columns(positions=seen))
 
-    def _reference(self, samples: Columns) -> None:
-        points = _on_floor(samples["ref_z1_x_m"], samples["ref_z1_y_m"])
+    def _line(self, x_name: str, y_name: str) -> Array:
+        """Return a line on the floor: of a long run every so many points, and the last."""
+        samples = self._run.samples
+        every = -(-row_count(samples) // PIECE_ROWS)
+        points, first = [], 0
+        for piece in pieces(samples, [x_name, y_name]):
+            points.append(_on_floor(piece[x_name], piece[y_name]))
+            last, rows = points[-1][-1:], len(points[-1])
+            points[-1] = points[-1][-first % every :: every]
+            first += rows
+        ended = (first - 1) % every == 0
+        return np.concatenate(points if ended else [*points, last])
+
+    def _reference(self) -> None:
+        points = self._line("ref_z1_x_m", "ref_z1_y_m")
         self._log_static("floor/reference", rr.LineStrips3D([points], colors=_GREY, radii=0.002))
         target = rr.Points3D(points[-1:], colors=_GREY, radii=0.012, labels=["z1*"])
         self._log_static("floor/target", target)
 
-    def _plot(self, plot: Plot, columns: Columns, style: _LineStyle) -> None:
+    def _plot(self, plot: Plot, style: _LineStyle) -> None:
         """Send the lines of a chart as one entity; a chart without any value is left out."""
-        table = np.column_stack([columns[column] * factor for _, column, factor in plot.lines])
-        if not np.isfinite(table).any():
+        names = [column for _, column, _ in plot.lines]
+        if not any(np.isfinite(p[name]).any() for p in self._pieces(names) for name in names):
             return
         count = len(plot.lines)
-        names = [style.prefix + line[0] for line in plot.lines]
-        lines = rr.SeriesLines(names=names, colors=style.colours[:count], widths=[1.5] * count)
+        legend = [style.prefix + line[0] for line in plot.lines]
+        lines = rr.SeriesLines(names=legend, colors=style.colours[:count], widths=[1.5] * count)
         self._log_static(plot.key, lines)
-        values = rr.Scalars.columns(scalars=table.ravel()).partition([count] * len(table))
-        self._recording.send_columns(f"{self._name}/{plot.key}", self._ticks, values)
+        for piece in self._pieces(names):
+            table = np.column_stack([piece[column] * factor for _, column, factor in plot.lines])
+            values = rr.Scalars.columns(scalars=table.ravel()).partition([count] * len(table))
+            self._send(plot.key, piece["t_s"], values)
 
     def _camera(self) -> None:
-        pictures, frames = self._run.pictures_from_start(), self._run.frames
-        time = [rr.TimeColumn(TIMELINE, duration=[max(item.t_s, 0.0) for item in pictures])]
-        blobs = [picture.path.read_bytes() for picture in pictures]
-        images = rr.EncodedImage.columns(blob=blobs, media_type=["image/jpeg"] * len(blobs))
-        self._recording.send_columns(f"{self._name}/camera/image", time, images)
-        if frames:
-            self._marks([picture.t_s for picture in pictures], time)
+        pictures = self._run.pictures_from_start()
+        times = [max(picture.t_s, 0.0) for picture in pictures]
+        for first in range(0, len(pictures), _PICTURES_AT_ONCE):
+            some = slice(first, first + _PICTURES_AT_ONCE)
+            blobs = [picture.path.read_bytes() for picture in pictures[some]]
+            images = rr.EncodedImage.columns(blob=blobs, media_type=["image/jpeg"] * len(blobs))
+            self._send("camera/image", times[some], images)
+            self._put()
+        if self._run.frames:
+            self._marks(np.array([picture.t_s for picture in pictures]), times)
 
-    def _marks(self, picture_times_s: list[float], time: list[rr.TimeColumn]) -> None:
+    def _marks(self, picture_times_s: Array, times: list[float]) -> None:
         """Send the marks found in each picture; without a find the last ones are cleared."""
-        frames = self._run.frames
-        rows = [int(np.abs(frames["t_arrival_s"] - t_s).argmin()) for t_s in picture_times_s]
-        marks = np.column_stack([frames[key][rows] for key in _MARKS])
+        marks = np.full((picture_times_s.size, len(_MARKS)), np.nan)
+        away_s = np.full(picture_times_s.size, np.inf)
+        for piece in pieces(self._run.frames, ["t_arrival_s", *_MARKS]):
+            t_s = piece["t_arrival_s"]
+            after = np.searchsorted(t_s, picture_times_s)
+            for row in (np.clip(after - 1, 0, t_s.size - 1), np.clip(after, 0, t_s.size - 1)):
+                off_s = np.abs(t_s[row] - picture_times_s)
+                nearer = off_s < away_s
+                away_s[nearer] = off_s[nearer]
+                found = np.column_stack([piece[key][row] for key in _MARKS])
+                marks[nearer] = found[nearer]
         found = np.isfinite(marks).all(axis=1)
         style = rr.Points2D.from_fields(colors=[_FRONT, _REAR], radii=4.0)
         self._log_static("camera/image/marks", style)
         positions = rr.Points2D.columns(positions=marks[found].reshape(-1, 2))
-        pairs = positions.partition(np.where(found, 2, 0))
-        self._recording.send_columns(f"{self._name}/camera/image/marks", time, pairs)
+        self._send("camera/image/marks", times, positions.partition(np.where(found, 2, 0)))
 
     def _events(self) -> None:
         events = self._run.events
-        time = [rr.TimeColumn(TIMELINE, duration=[max(event.t_s, 0.0) for event in events])]
         text = [visible(f"{event.t_s:.2f} s  {event.kind}: {event.text}") for event in events]
         level = ["WARN" if event.kind in _GRAVE else "INFO" for event in events]
         lines = rr.TextLog.columns(text=text, level=level)
-        self._recording.send_columns(f"{self._name}/events", time, lines)
+        self._send("events", [max(event.t_s, 0.0) for event in events], lines)
 
 
 def blueprint(runs: Sequence[RunRecord], names: Sequence[str]) -> rrb.Blueprint:
@@ -309,9 +351,14 @@ def _chart(plot: Plot, names: Sequence[str]) -> rrb.TimeSeriesView:
 
 def _eye_above(runs: Sequence[RunRecord]) -> rrb.EyeControls3D:
     """Look straight down on the middle of all paths, from high enough to see them whole."""
-    x_m = np.concatenate([np.r_[run.samples["est_x_m"], run.samples["ref_z1_x_m"]] for run in runs])
-    y_m = np.concatenate([np.r_[run.samples["est_y_m"], run.samples["ref_z1_y_m"]] for run in runs])
-    x_m, y_m = x_m[np.isfinite(x_m)], y_m[np.isfinite(y_m)]
+    names = ("est_x_m", "ref_z1_x_m", "est_y_m", "ref_z1_y_m")
+    ends = [
+        [np.concatenate((piece[one], piece[other])) for one, other in (names[:2], names[2:])]
+        for run in runs
+        if row_count(run.samples)
+        for piece in map(_known_ends, pieces(run.samples, names))
+    ]
+    x_m, y_m = (np.concatenate([np.empty(0), *(end[axis] for end in ends)]) for axis in (0, 1))
     if x_m.size == 0:
         return rrb.EyeControls3D(position=(0, 0, 3), look_target=(0, 0, 0), eye_up=(0, 1, 0))
     middle = ((x_m.max() + x_m.min()) / 2, (y_m.max() + y_m.min()) / 2, 0.0)
@@ -319,3 +366,9 @@ def _eye_above(runs: Sequence[RunRecord]) -> rrb.EyeControls3D:
     height_m = max(high_m, wide_m / 1.6) / (2.0 * math.tan(_EYE_HALF_ANGLE_RAD))
     position = (middle[0], middle[1], height_m)
     return rrb.EyeControls3D(position=position, look_target=middle, eye_up=(0.0, 1.0, 0.0))
+
+
+def _known_ends(piece: Columns) -> Columns:
+    """Return the least and the largest known value of each column, nothing where none is known."""
+    known = {name: values[np.isfinite(values)] for name, values in piece.items()}
+    return {k: np.array([v.min(), v.max()]) if v.size else v for k, v in known.items()}

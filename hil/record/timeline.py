@@ -62,12 +62,12 @@ class Timeline:
         if self._origin_s is not None:  # the short way: this runs for every frame
             t_s = t_host_s - self._origin_s
             row = frame_row(frame, t_s, t_s - latency_s, measurement)
-            self._recorder.frame(row, frame.image)
+            self._recorder.frame(row, frame.picture)
             return
         self._at(
             t_host_s,
             lambda t_s: self._recorder.frame(
-                frame_row(frame, t_s, t_s - latency_s, measurement), frame.image
+                frame_row(frame, t_s, t_s - latency_s, measurement), frame.picture
             ),
         )
 

@@ -44,18 +44,18 @@ from hil.runs.watched import WatchedSink
 from hil.wire.identity import board_hashes
 from hil.wire.link import BoardLink
 from vision.localisers.making import make_localiser
-from vision.spread import spread
+from vision.looking import looker
 
 if TYPE_CHECKING:
     from hil.config.camera import CameraConfig
     from hil.config.scenario import Scenario
     from hil.core.registry import Entry
-    from hil.core.rig import Rig
+    from hil.core.rig import Picture, Rig
     from hil.core.types import OuterLaw, Pose, PoseMeasurement
     from hil.record.memory import RunSink
     from hil.record.reader import RunRecord
     from hil.runs.watched import Watch
-    from vision.tracker import Image, Localiser
+    from vision.looking import Looker
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,21 +286,21 @@ class _WhenAsked:
 
     def __init__(self, camera: CameraConfig) -> None:
         self._camera = camera
-        self._made: Localiser | None = None
+        self._made: Looker | None = None
 
     def locate(
-        self, image_bgr: Image, predicted: Pose | None, search_radius_m: float
+        self, image_bgr: Picture, predicted: Pose | None, search_radius_m: float
     ) -> PoseMeasurement:
         """Return what the camera's localiser says."""
-        self._made = self._made or make_localiser(self._camera)
+        self._made = self._made or looker(make_localiser(self._camera))
         return self._made.locate(image_bgr, predicted, search_radius_m)
 
 
-def _localiser_of(spec: RunSpec) -> Localiser:
+def _localiser_of(spec: RunSpec) -> Looker:
     """Return the localiser of a run; where poses are drawn its projections need not be worked out."""
     if is_simulated(spec.target) and spec.camera == "pose":
         return _WhenAsked(spec.scenario.camera)
-    return spread(make_localiser(spec.scenario.camera))
+    return looker(make_localiser(spec.scenario.camera))
 
 
 def make_manifest(spec: RunSpec) -> Manifest:

@@ -128,11 +128,11 @@ class Intake:
         """Return the frame's own pose, else what the localiser finds near the estimate."""
         if frame.pose is not None:
             return frame.pose
-        assert frame.image is not None
+        assert frame.picture is not None
         before = self._parts.estimator.estimate_at(exposure_s)
         camera = self._camera
         predicted = before.pose if before is not None else None
-        seen = self._parts.localiser.locate(frame.image, predicted, camera.search_radius_m)
+        seen = self._parts.localiser.locate(frame.picture, predicted, camera.search_radius_m)
         return unrolled(seen, camera, before)
 
     def hand_over_frames(self) -> None:

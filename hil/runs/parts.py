@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from hil.record.memory import RunSink
     from hil.record.timeline import Timeline
     from hil.wire.link import BoardLink
-    from vision.tracker import Localiser
+    from vision.looking import Looker
 
 Progress = Callable[[float], None]
 # Takes host time, state of the robot, and whether it is armed, once a tick.
@@ -29,7 +29,7 @@ class Parts:
     rig: Rig
     link: BoardLink
     camera_clock: CameraClock
-    localiser: Localiser
+    localiser: Looker
     estimator: Estimator
     law: OuterLaw
     reference: Reference

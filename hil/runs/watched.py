@@ -9,10 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Protocol
 
+from hil.core.rig import whole
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from hil.core.rig import Picture
     from hil.record.memory import RunSink
     from hil.runs.parts import Parts
 
@@ -52,10 +55,10 @@ class WatchedSink:
         self._watch.tick(row)
         self._add_notes(row[0])
 
-    def frame(self, row: Sequence[float], image: NDArray[np.uint8] | None = None) -> None:
+    def frame(self, row: Sequence[float], image: Picture | None = None) -> None:
         """Take one camera frame and its image."""
         self._sink.frame(row, image)
-        self._watch.frame(row, image)
+        self._watch.frame(row, None if image is None else whole(image))
 
     def event(self, t_s: float, kind: str, text: str) -> None:
         """Take one line of what happened; what the watcher has to add comes before it."""

@@ -20,6 +20,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from hil.control.estimators.fused import Fused
+from hil.core.rig import whole
 from hil.record.memory import MemoryRecorder
 from hil.runs import _native
 
@@ -77,8 +78,12 @@ def make_pump(parts: Parts, watch: _native.Watch, note: Note) -> _native.Pump | 
 
 def picture_of(frame: Frame) -> bytes:
     """Return what equal pictures have equal, b"" where there is nothing to compare."""
-    if frame.image is not None:
-        return bytes(frame.image[::_EVERY, ::_EVERY].tobytes())
+    picture = frame.picture
+    if picture is not None:
+        content: object = getattr(picture, "content", None)
+        if content is not None:
+            return repr(content).encode()
+        return bytes(whole(picture)[::_EVERY, ::_EVERY].tobytes())
     pose = frame.pose.pose if frame.pose is not None else None
     if pose is None:
         return b""

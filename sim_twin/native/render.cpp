@@ -75,6 +75,10 @@ CAMERA_WIDE void noisy(const int16_t* level, const int16_t* sigma, const int16_t
 
 }  // namespace
 
+Window common(const Window& a, const Window& b) {
+  return {std::max(a.u0, b.u0), std::max(a.v0, b.v0), std::min(a.u1, b.u1), std::min(a.v1, b.v1)};
+}
+
 Renderer::Renderer(const View& view, const Scene& scene, const Robot& robot, uint64_t seed)
     : view_(view), scene_(scene), robot_(robot), seed_(seed) {
   for (Block& block : scene_.blocks) {
@@ -116,6 +120,8 @@ Renderer::Renderer(const View& view, const Scene& scene, const Robot& robot, uin
 
 Renderer::Renderer(const Renderer& other, uint64_t seed) : Renderer(other) {
   seed_ = seed;
+  slots_.clear();
+  parts_.clear();
   noise_bank();
 }
 
@@ -181,7 +187,8 @@ SightPatch Renderer::sight_patch(int u, int v) const {
 
 void Renderer::background() {
   const size_t pixels = sight_.size();
-  for (std::vector<float>* map : {&floor_dn_, &glare_dn_, &dn_}) map->resize(3 * pixels);
+  for (Shared<float>* map : {&floor_dn_, &glare_dn_}) map->resize(3 * pixels);
+  std::vector<float> both(3 * pixels);
   for (int v = 0; v < view_.height; ++v)
     for (int u = 0; u < view_.width; ++u) {
       const size_t at = static_cast<size_t>(v) * view_.width + u;
@@ -196,17 +203,17 @@ void Renderer::background() {
         const float gain = scene_.white_balance[k];
         floor_dn_[3 * at + k] = gain * sum[k] / SAMPLES_BACKGROUND * scene_.light[at];
         glare_dn_[3 * at + k] = gain * scene_.glare[at];
-        dn_[3 * at + k] = floor_dn_[3 * at + k] + glare_dn_[3 * at + k];
+        both[3 * at + k] = floor_dn_[3 * at + k] + glare_dn_[3 * at + k];
       }
     }
   level_.resize(3 * pixels);
   sigma_.resize(3 * pixels);
-  quantise(dn_.data(), static_cast<int>(3 * pixels), level_.data(), sigma_.data());
+  quantise(both.data(), static_cast<int>(3 * pixels), level_.data(), sigma_.data());
 }
 
 // The part of the image that the robot at its first and last pose can reach, grown by `reach_m` on
 // the floor.
-Renderer::Window Renderer::window(double reach_m) const {
+Window Renderer::window(double reach_m) const {
   double lo_u = 1e9, lo_v = 1e9, hi_u = -1e9, hi_v = -1e9;
   for (const Pose& pose : {slots_.front(), slots_.back()})
     for (int level = 0; level < 2; ++level)
@@ -237,8 +244,7 @@ void Renderer::set_windows() {
   const bool bars =
       std::any_of(scene_.bars.begin(), scene_.bars.end(), [](const Bar& bar) { return !bar.body; });
   const Window body = bars ? shaded_ : window(0.0);
-  hidden_ = {std::max(body.u0, shaded_.u0), std::max(body.v0, shaded_.v0), std::min(body.u1, shaded_.u1),
-             std::min(body.v1, shaded_.v1)};
+  hidden_ = common(body, shaded_);
 }
 
 void Renderer::composite_pixel(int u, int v, uint8_t flags, uint8_t id, float shade, float* dn) const {
@@ -263,13 +269,15 @@ void Renderer::composite_pixel(int u, int v, uint8_t flags, uint8_t id, float sh
             share * sum[k] * scene_.light[at] * scene_.white_balance[k];
 }
 
-void Renderer::composite() {
-  const Window &w = shaded_, &body = hidden_;
-  const int columns = w.u1 - w.u0, rows = w.v1 - w.v0, across = body.u1 - body.u0;
+Renderer::Part Renderer::composite(const Window& w) {
+  // The blur carries an edge from outside the window into it.
+  const Window body = common(w.grown(reach_), hidden_);
+  const bool hides = !body.empty();
+  if (hides) classify(body);
+  const int columns = w.u1 - w.u0, rows = w.v1 - w.v0;
+  const Window own = common(w, body);
   const size_t count = 3 * static_cast<size_t>(columns) * rows;
   dn_.resize(count);
-  window_level_.resize(count);
-  window_sigma_.resize(count);
   shade_.resize(columns);
   for (int v = w.v0; v < w.v1; ++v) {
     const size_t first = static_cast<size_t>(v) * view_.width + w.u0;
@@ -278,15 +286,29 @@ void Renderer::composite() {
     shade_row(&sight_[first], columns, shade_.data());
     for (int i = 0; i < columns; ++i)
       for (int k = 0; k < 3; ++k) dn[3 * i + k] = glare[3 * i + k] + shade_[i] * floor[3 * i + k];
-    if (v < body.v0 || v >= body.v1) continue;
-    const size_t row = static_cast<size_t>(v - body.v0) * across;
-    for (int i = 0; i < across; ++i) {
-      const uint8_t flags = flags_[row + i], id = id_first_[row + i];
-      const int u = body.u0 + i, column = u - w.u0;
+    if (!hides || v < own.v0 || v >= own.v1) continue;
+    const size_t row = static_cast<size_t>(v - body.v0) * (body.u1 - body.u0);
+    for (int u = own.u0; u < own.u1; ++u) {
+      const uint8_t flags = flags_[row + u - body.u0], id = id_first_[row + u - body.u0];
+      const int column = u - w.u0;
       if (flags || id != ID_FLOOR) composite_pixel(u, v, flags, id, shade_[column], dn + 3 * column);
     }
   }
-  quantise(dn_.data(), static_cast<int>(count), window_level_.data(), window_sigma_.data());
+  Part part;
+  part.at = w;
+  part.level.resize(count);
+  part.sigma.resize(count);
+  quantise(dn_.data(), static_cast<int>(count), part.level.data(), part.sigma.data());
+  return part;
+}
+
+// A window's part of what the robot hides and shades, drawn only when it was not before.
+const Renderer::Part& Renderer::part(const Window& wanted) {
+  for (const Part& part : parts_)
+    if (part.at.holds(wanted)) return part;
+  if (parts_.size() == MOST_PARTS) parts_.erase(parts_.begin());
+  parts_.push_back(composite(wanted));
+  return parts_.back();
 }
 
 void Renderer::quantise(const float* dn, int count, int16_t* level, int16_t* sigma) const {
@@ -325,33 +347,40 @@ bool Renderer::same(const std::vector<Pose>& a, const std::vector<Pose>& b) {
 }
 
 void Renderer::make(uint64_t index, const std::vector<std::array<double, 3>>& poses, uint8_t* out) {
-  Window w{0, 0, 0, 0};
+  draw(index, poses, {0, 0, view_.width, view_.height}, out);
+}
+
+void Renderer::draw(uint64_t index, const std::vector<std::array<double, 3>>& poses, const Window& wanted,
+                    uint8_t* out) {
+  static const Part nothing;
+  const Part* robot = &nothing;
   if (!poses.empty()) {
     const std::vector<Pose> drawn = slots_of(poses);
     if (!same(drawn, slots_)) {
       slots_ = drawn;
       set_windows();
-      classify();
-      composite();
+      parts_.clear();
     }
-    w = shaded_;
+    const Window own = common(wanted, shaded_);
+    if (!own.empty()) robot = &part(own);
   }
-  const int width = view_.width;
-  for (int v = 0; v < view_.height; ++v) {
+  const Window w = common(wanted, robot->at);
+  for (int v = wanted.v0; v < wanted.v1; ++v) {
     const int16_t* normal = &normal_[hash(seed_ + 7, index, v) % BANK];
-    const size_t row = 3 * static_cast<size_t>(v) * width;
+    const size_t row = 3 * static_cast<size_t>(v) * view_.width;
     const auto still = [&](int u0, int u1) {
       emit(&level_[row + 3 * u0], &sigma_[row + 3 * u0], normal + 3 * u0, 3 * (u1 - u0), out + row + 3 * u0);
     };
     if (v < w.v0 || v >= w.v1 || w.u1 <= w.u0) {
-      still(0, width);
+      still(wanted.u0, wanted.u1);
       continue;
     }
-    still(0, w.u0);
-    const size_t in_window = 3 * static_cast<size_t>(v - w.v0) * (w.u1 - w.u0);
-    emit(&window_level_[in_window], &window_sigma_[in_window], normal + 3 * w.u0, 3 * (w.u1 - w.u0),
+    if (wanted.u0 < w.u0) still(wanted.u0, w.u0);
+    const size_t across = robot->at.u1 - robot->at.u0;
+    const size_t in_part = 3 * (static_cast<size_t>(v - robot->at.v0) * across + (w.u0 - robot->at.u0));
+    emit(&robot->level[in_part], &robot->sigma[in_part], normal + 3 * w.u0, 3 * (w.u1 - w.u0),
          out + row + 3 * w.u0);
-    if (w.u1 < width) still(w.u1, width);
+    if (w.u1 < wanted.u1) still(w.u1, wanted.u1);
   }
 }
 

@@ -7,10 +7,28 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <utility>
 #include <vector>
 
 namespace camera {
+
+// Numbers worked out once; a copy has the same ones, not its own. Not to be written after the first copy.
+template <class T>
+class Shared {
+ public:
+  Shared() = default;
+  Shared(std::vector<T> values) : values_(std::make_shared<std::vector<T>>(std::move(values))) {}
+  void resize(size_t count) { values_->resize(count); }
+  size_t size() const { return values_->size(); }
+  T* data() const { return values_->data(); }
+  T& operator[](size_t i) const { return (*values_)[i]; }
+
+ private:
+  std::shared_ptr<std::vector<T>> values_ = std::make_shared<std::vector<T>>();
+};
 
 using Colour = std::array<float, 3>;  // reflectance: blue, green, red
 
@@ -61,14 +79,14 @@ struct Robot {
 };
 
 struct Scene {
-  std::vector<float> texture;  // floor reflectance factor, periodic, by rows
+  Shared<float> texture;  // floor reflectance factor, periodic, by rows
   int texture_size = 0;        // px per side
   float texture_step = 0;      // m per px
   Colour floor{};
   std::vector<Block> blocks;
   std::vector<Bar> bars;
-  std::vector<float> light;  // DN of a white surface, per pixel
-  std::vector<float> glare;  // DN added, per pixel
+  Shared<float> light;  // DN of a white surface, per pixel
+  Shared<float> glare;  // DN added, per pixel
   Colour white_balance{};
   float blur = 0;                             // px RMS
   float read_noise = 0, dn_per_electron = 0;  // DN
@@ -99,6 +117,18 @@ struct Sample {
   int slot = 0;
 };
 
+// Columns u0 to u1 - 1 of rows v0 to v1 - 1.
+struct Window {
+  int u0, v0, u1, v1;
+
+  bool empty() const { return u1 <= u0 || v1 <= v0; }
+  bool holds(const Window& w) const {
+    return w.empty() || (u0 <= w.u0 && v0 <= w.v0 && u1 >= w.u1 && v1 >= w.v1);
+  }
+  Window grown(int by) const { return {u0 - by, v0 - by, u1 + by, v1 + by}; }
+};
+Window common(const Window& a, const Window& b);
+
 class Renderer {
  public:
   Renderer(const View& view, const Scene& scene, const Robot& robot, uint64_t seed);
@@ -108,11 +138,17 @@ class Renderer {
   // Writes the frame `index`, (height, width, 3); poses are (x, y, theta), evenly spaced from
   // the start to the end of the exposure.
   void make(uint64_t index, const std::vector<std::array<double, 3>>& poses, uint8_t* out);
+  // Writes only the pixels of a window of that frame, the same ones, where they are in the whole.
+  void draw(uint64_t index, const std::vector<std::array<double, 3>>& poses, const Window& wanted,
+            uint8_t* out);
 
  private:
-  struct Window {
-    int u0, v0, u1, v1;
+  // What the robot at the poses in `slots_` hides and shades of a window, before noise.
+  struct Part {
+    Window at{0, 0, 0, 0};
+    std::vector<int16_t> level, sigma;
   };
+  static constexpr size_t MOST_PARTS = 4;
   void background();
   void edge_table();
   void noise_bank();
@@ -123,8 +159,9 @@ class Renderer {
   static bool same(const std::vector<Pose>& a, const std::vector<Pose>& b);
   Window window(double reach_m) const;
   void set_windows();
-  void classify();
-  void composite();
+  const Part& part(const Window& wanted);
+  Part composite(const Window& w);
+  void classify(const Window& w);
   void composite_pixel(int u, int v, uint8_t flags, uint8_t id, float shade, float* dn) const;
   void trace_samples(int u, int v, const Sample* samples, int count, uint8_t flags, uint8_t* hits) const;
   uint8_t trace(const Sight& world, const Pose& pose) const;
@@ -138,20 +175,20 @@ class Renderer {
   Scene scene_;
   Robot robot_;
   uint64_t seed_;
-  std::vector<Sight> sight_;                // per pixel centre
-  std::vector<float> floor_dn_, glare_dn_;  // background before noise: what shade takes, the rest
-  std::vector<int16_t> level_, sigma_;      // the same in the noise stage's steps
+  Shared<Sight> sight_;                // per pixel centre
+  Shared<float> floor_dn_, glare_dn_;  // background before noise: what shade takes, the rest
+  Shared<int16_t> level_, sigma_;      // the same in the noise stage's steps
   std::vector<int16_t> normal_;
   std::vector<Sample> samples_;
   std::vector<Colour> colour_of_id_;
   std::vector<uint8_t> mark_id_, edge_of_ids_;
   int reach_ = 1;  // px that the lens blur carries an edge
   float robot_radius_ = 0, robot_height_ = 0;
-  std::vector<Pose> slots_;                         // as last composited into the window buffers
+  std::vector<Pose> slots_;                         // as last drawn
+  std::vector<Part> parts_;                         // what was drawn of it so far
   Window shaded_{0, 0, 0, 0}, hidden_{0, 0, 0, 0};  // what the robot shades; what it may hide
   std::vector<uint8_t> id_first_, id_last_, flags_, flags_row_;
   std::vector<float> dn_, shade_;
-  std::vector<int16_t> window_level_, window_sigma_;
 };
 
 // Normalised, undistorted coordinates of a pixel, by fixed-point iteration.

@@ -16,6 +16,7 @@ namespace nb = nanobind;
 namespace {
 
 using Image = nb::ndarray<nb::numpy, uint8_t, nb::shape<-1, -1, 3>>;
+using Canvas = nb::ndarray<uint8_t, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
 using FloatImage = nb::ndarray<const float, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
 
 std::vector<float> flat(const FloatImage& image) { return {image.data(), image.data() + image.size()}; }
@@ -77,14 +78,31 @@ struct Bound {
     return v;
   }
 
-  Image make(uint64_t index, const std::vector<std::array<double, 3>>& poses) {
+  // A frame's memory, nothing drawn in it.
+  Image blank() {
     const size_t height = view.height, width = view.width;
     auto sheet = std::make_unique<Sheet>(sheets, sheets->take(height * width * 3));
     uint8_t* const pixels = sheet->pixels.get();
-    renderer.make(index, poses, pixels);
     nb::capsule owner(sheet.get(), [](void* p) noexcept { delete static_cast<Sheet*>(p); });
     sheet.release();
     return Image(pixels, {height, width, 3}, owner);
+  }
+
+  Image make(uint64_t index, const std::vector<std::array<double, 3>>& poses) {
+    Image image = blank();
+    renderer.make(index, poses, image.data());
+    return image;
+  }
+
+  void draw(uint64_t index, const std::vector<std::array<double, 3>>& poses, const std::array<int, 4>& window,
+            const Canvas& image) {
+    const size_t height = view.height, width = view.width;
+    const auto [left, top, right, bottom] = window;
+    if (image.shape(0) != height || image.shape(1) != width)
+      throw std::invalid_argument("image must have the view's height and width");
+    if (left < 0 || top < 0 || right > view.width || bottom > view.height)
+      throw std::invalid_argument("window must lie in the view");
+    renderer.draw(index, poses, {left, top, right, bottom}, image.data());
   }
 };
 
@@ -202,7 +220,10 @@ void bind_render(nb::module_& m) {
           nb::rv_policy::take_ownership, nb::arg("seed"), "The same scene with the noise of another seed.")
       .def("make", &Bound::make, nb::arg("index"), nb::arg("poses"),
            "The frame `index`, (height, width, 3) BGR, with the robot at `poses` (x, y, theta)\n"
-           "from the start to the end of the exposure; without poses the empty scene.");
+           "from the start to the end of the exposure; without poses the empty scene.")
+      .def("blank", &Bound::blank, "Memory for a frame, nothing drawn in it.")
+      .def("draw", &Bound::draw, nb::arg("index"), nb::arg("poses"), nb::arg("window"), nb::arg("image"),
+           "Draws the pixels of a window (left, top, right, bottom) of that frame into `image`.");
   m.def("floor_map", &floor_map, nb::arg("view"),
         "World (X, Y) on the floor seen by every pixel, (height, width, 2), m.");
   m.def(

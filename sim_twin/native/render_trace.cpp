@@ -138,9 +138,9 @@ uint8_t Renderer::trace(const Sight& world, const Pose& pose) const {
   return trace_sides(body);
 }
 
-void Renderer::classify() {
-  const Window& w = hidden_;
-  const int columns = std::max(w.u1 - w.u0, 0), rows = std::max(w.v1 - w.v0, 0);
+// What each pixel of a window shows, and which are edges; next to the window's own edge that is not whole.
+void Renderer::classify(const Window& w) {
+  const int columns = w.u1 - w.u0, rows = w.v1 - w.v0;
   const size_t count = static_cast<size_t>(columns) * rows;
   id_first_.resize(count);
   id_last_.resize(count);

@@ -15,4 +15,12 @@ def make_marks(camera: CameraConfig) -> Localiser:
     """Return the localiser of the colour marks that a camera's file describes."""
     if camera.marks.more:
         return ManyMarks(camera)
-    return MarkLocaliser(camera_model(camera), camera.marks)
+    key = camera.model_dump_json()
+    if key not in _kept:
+        _kept.clear()
+        _kept[key] = MarkLocaliser(camera_model(camera), camera.marks)
+    return _kept[key]
+
+
+# That of the last camera, by its configuration: the next run mostly has the same, and it holds no past.
+_kept: dict[str, MarkLocaliser] = {}

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,10 @@ from vision.disc_fit import Disc, Marks, RimFitter
 from vision.mark_search import CHROMA_BASIS, Centres, MarkSearch, Point, Window
 from vision.pose_fit import weighted_pose
 
+if TYPE_CHECKING:
+    from hil.core.rig import Picture
+
 Array = NDArray[np.float64]
-Image = NDArray[np.uint8]
 
 # What is accepted.
 SHARE_MIN = 0.4
@@ -40,6 +43,7 @@ QUALITY_RESIDUAL = 0.06  # of the radius
 # What is hardly within each limit is no robot: the least of extreme blur and noise has 0.17.
 QUALITY_MIN = 0.12
 SAME_PLACE_M = 0.02
+_UPPER = np.triu_indices(3)
 TWO_PLACES = "two places look like the robot"
 
 
@@ -71,7 +75,7 @@ class MarkLocaliser:
         )
 
     def locate(
-        self, image_bgr: Image, predicted: Pose | None, search_radius_m: float
+        self, image_bgr: Picture, predicted: Pose | None, search_radius_m: float
     ) -> PoseMeasurement:
         """Return the pose seen in an image, (H, W, 3) uint8 BGR.
 
@@ -86,7 +90,7 @@ class MarkLocaliser:
         return self.inside(image_bgr, whole, predicted)
 
     def near(
-        self, image_bgr: Image, predicted: Pose, search_radius_m: float
+        self, image_bgr: Picture, predicted: Pose, search_radius_m: float
     ) -> PoseMeasurement | None:
         """Return the pose at a prediction or within `search_radius_m` of it, None if not there."""
         centres = self._marks_of(predicted)
@@ -98,7 +102,7 @@ class MarkLocaliser:
         return None if found is None else self._measurement(found, in_window=True)
 
     def inside(
-        self, image_bgr: Image, window: Window, predicted: Pose | None = None
+        self, image_bgr: Picture, window: Window, predicted: Pose | None = None
     ) -> PoseMeasurement:
         """Return the pose seen in a part of the image; of several alike, the one that is ours."""
         finds, reason = self._search(image_bgr, window)
@@ -160,7 +164,7 @@ class MarkLocaliser:
         )
         return front, rear
 
-    def _window(self, image: Image, centres_m: Centres, radius_m: float) -> Window | None:
+    def _window(self, image: Picture, centres_m: Centres, radius_m: float) -> Window | None:
         """Return the part of the image around predicted marks, None when out of view."""
         reach_m = radius_m + 2.0 * self._radius_m
         corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) * reach_m
@@ -176,12 +180,13 @@ class MarkLocaliser:
 
     # -- coarse --------------------------------------------------------------------------------
 
-    def _search(self, image: Image, window: Window) -> tuple[list[_Found], str]:
+    def _search(self, image: Picture, window: Window) -> tuple[list[_Found], str]:
         """Return what looks like the robot in a part of the image; if nothing, the reason.
 
         Two at most where nobody said which is ours: one more is one too many.
         """
-        pairs, reason = self._places.pairs(image, window)
+        looked = image if isinstance(image, np.ndarray) else image.part(self._places.seen(window))
+        pairs, reason = self._places.pairs(looked, window)
         finds: list[_Found] = []
         why = ""
         for centres in pairs:
@@ -200,7 +205,7 @@ class MarkLocaliser:
 
     # -- fine ----------------------------------------------------------------------------------
 
-    def _measured(self, image: Image, centres_m: Centres) -> tuple[_Found | None, str]:
+    def _measured(self, image: Picture, centres_m: Centres) -> tuple[_Found | None, str]:
         """Return the marks near two guessed centres, or None and why they are not the robot's."""
         discs = self._rims.fit(image, centres_m)
         if discs is None:
@@ -265,7 +270,7 @@ class MarkLocaliser:
             quality=self._quality(found),
             sigma_xy_m=math.sqrt(0.5 * (covariance[0, 0] + covariance[1, 1])),
             sigma_theta_rad=math.sqrt(covariance[2, 2]),
-            covariance=tuple(covariance[np.triu_indices(3)].tolist()),
+            covariance=tuple(covariance[_UPPER].tolist()),
             details={
                 "front_u_px": front.u_px,
                 "front_v_px": front.v_px,

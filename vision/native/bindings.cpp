@@ -98,7 +98,28 @@ void bind_rims(nb::module_& m) {
             }
             return std::pair((*discs)[0], (*discs)[1]);
           },
-          "image"_a, "centres_m"_a);
+          "image"_a, "centres_m"_a)
+      .def(
+          "window",
+          [](const RimFitter& fitter, const Point& centre_m, int width, int height) {
+            return fitter.window(point(centre_m), width, height);
+          },
+          "centre_m"_a, "width"_a, "height"_a)
+      .def(
+          "fit_within",
+          [](const RimFitter& fitter, const Image& image, const std::array<Point, 2>& centres_m,
+             const std::array<std::array<std::ptrdiff_t, 4>, 2>& windows) {
+            vision::Drawn drawn{windows};
+            Picture picture = view(image);
+            picture.drawn = &drawn;
+            const auto discs = fitter.fit(picture, {point(centres_m[0]), point(centres_m[1])});
+            std::optional<std::pair<Disc, Disc>> found;
+            if (discs) {
+              found = std::pair((*discs)[0], (*discs)[1]);
+            }
+            return std::pair(found, drawn.missed);
+          },
+          "image"_a, "centres_m"_a, "windows"_a);
 }
 
 void bind_search(nb::module_& m) {

@@ -16,6 +16,7 @@ constexpr int kCentroids = 2;
 constexpr double kCentredPx = 1.0;  // after a move shorter than that one is enough
 constexpr int kPolarRays = 16;
 constexpr std::array<double, 6> kPolarRadii = {0.3, 0.6, 0.85, 1.05, 1.25, 1.5};
+constexpr double kGuessPx = 3.0;  // by which a guess is mostly off at most
 constexpr double kCentroidLevel = 0.4;  // of the way from the surroundings to the highest response
 // A step this short ends the fit; after one longer than that all rays count again.
 constexpr double kSettledPx = 0.03;
@@ -213,6 +214,20 @@ std::optional<RimFitter::Shape> RimFitter::shape(Vec2 px) const {
   found.step_px = reach_px(radius) / profiles_.edge();
   found.room_px = reach + found.step_px * profiles_.half() + 1.0;
   return found;
+}
+
+std::optional<std::array<int, 4>> RimFitter::window(Vec2 centre_m, int width, int height) const {
+  const Vec2 px = camera_.project(centre_m, height_m_);
+  const std::optional<Shape> rim = shape(px);
+  if (!rim) {
+    return std::nullopt;
+  }
+  const double room = std::max(rim->room_px, kPolarRadii.back() * rim->radius_px) + kGuessPx;
+  const auto bound = [](double p, int most) {
+    return static_cast<int>(std::clamp(p, 0.0, static_cast<double>(most)));
+  };
+  return std::array<int, 4>{bound(px.x - room, width), bound(px.y - room, height),
+                            bound(px.x + room + 2.0, width), bound(px.y + room + 2.0, height)};
 }
 
 std::optional<Vec2> RimFitter::centred(const Picture& picture, Vec2 px, const Colour& weights) const {

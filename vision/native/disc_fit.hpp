@@ -29,6 +29,8 @@ class RimFitter {
   // Both discs from guesses of their centres, m on their plane, off by half of the radius at most;
   // none where a disc is out of view or has no edge.
   std::optional<std::array<Disc, 2>> fit(const Picture& picture, const std::array<Vec2, 2>& centres_m) const;
+  // The part of a picture in which a fit from such a guess mostly looks: left, top, right, bottom.
+  std::optional<std::array<int, 4>> window(Vec2 centre_m, int width, int height) const;
 
  private:
   // The rim seen about a pixel: arms from the image of its centre, and normals outwards.

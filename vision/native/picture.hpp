@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -20,10 +21,26 @@ inline float response(const Colour& c, const Colour& weights) {
   return c.b * weights.b + c.g * weights.g + c.r * weights.r;
 }
 
+// Where a picture that is drawn in parts has pixels, and whether others were looked at.
+struct Drawn {
+  std::array<std::array<std::ptrdiff_t, 4>, 2> windows;  // left, top, right, bottom
+  bool missed = false;
+
+  void look(std::ptrdiff_t u, std::ptrdiff_t v, std::ptrdiff_t right, std::ptrdiff_t down) {
+    for (const auto& w : windows) {
+      if (u >= w[0] && v >= w[1] && u + right < w[2] && v + down < w[3]) {
+        return;
+      }
+    }
+    missed = true;
+  }
+};
+
 struct Picture {
   const std::uint8_t* data;
   std::ptrdiff_t height, width;
   std::ptrdiff_t row, pixel, channel;  // strides, bytes
+  Drawn* drawn = nullptr;              // none: it has all its pixels
 
   Colour at(std::ptrdiff_t u, std::ptrdiff_t v) const {
     const std::uint8_t* p = data + v * row + u * pixel;
@@ -46,6 +63,9 @@ struct Picture {
     const std::uint8_t* p = data + v0 * row + u0 * pixel;
     const std::ptrdiff_t right = width > 1 ? pixel : 0;
     const std::ptrdiff_t down = height > 1 ? row : 0;
+    if (drawn != nullptr) {
+      drawn->look(u0, v0, width > 1 ? 1 : 0, height > 1 ? 1 : 0);
+    }
     const auto mixed = [&](std::ptrdiff_t c) {
       const float a = p[c];
       const float b = p[c + right];
