@@ -101,7 +101,7 @@ class MemoryRecorder:
             samples=_columns(self.manifest.sample_names, self.rows),
             frames=_columns(FRAME_NAMES, self.frames),
             events=tuple(self.events),
-        )
+        ).with_own_figures()
 
 
 def _columns(names: Sequence[str], rows: Sequence[Sequence[float]]) -> Columns:
