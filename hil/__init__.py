@@ -50,6 +50,11 @@ _NAMES = {
     "Contacts": ("hil.control.vehicles.vehicle", "Contacts"),
     "TwoSided": ("hil.control.vehicles.vehicle", "TwoSided"),
     "VehicleConfig": ("hil.config.robot", "VehicleConfig"),
+    "RunData": ("hil.analysis.metrics", "RunData"),
+    "check_cost": ("hil.tools.conformance", "check_cost"),
+    "check_figure": ("hil.tools.conformance", "check_figure"),
+    "figure": ("hil.core.figures", "figure"),
+    "tuning_cost": ("hil.core.figures", "tuning_cost"),
     "serve_plant": ("sim_twin.plant_server", "serve"),
 }
 # decorator -> registry of hil.core.registries
@@ -82,6 +87,7 @@ __all__ = [
     "ReferenceState",
     "RigFault",
     "Run",
+    "RunData",
     "Scenario",
     "Section",
     "TwoSided",
@@ -89,13 +95,16 @@ __all__ = [
     "WheelSample",
     "__version__",
     "camera_model",
+    "check_cost",
     "check_estimator",
+    "check_figure",
     "check_law",
     "check_localiser",
     "check_robot",
     "compare",
     "estimator",
     "experiment",
+    "figure",
     "load_scenario",
     "localiser",
     "make_env",
@@ -106,10 +115,12 @@ __all__ = [
     "replay",
     "run",
     "serve_plant",
+    "tuning_cost",
     "vehicle",
 ]
 
 if TYPE_CHECKING:
+    from hil.analysis.metrics import RunData as RunData
     from hil.api import Comparison as Comparison
     from hil.api import Experiment as Experiment
     from hil.api import Run as Run
@@ -134,6 +145,8 @@ if TYPE_CHECKING:
     from hil.control.vehicles.vehicle import TwoSided as TwoSided
     from hil.core.errors import BadInput as BadInput
     from hil.core.errors import RigFault as RigFault
+    from hil.core.figures import figure as figure
+    from hil.core.figures import tuning_cost as tuning_cost
     from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES, VEHICLES
     from hil.core.types import Estimate as Estimate
     from hil.core.types import Estimator as Estimator
@@ -143,7 +156,9 @@ if TYPE_CHECKING:
     from hil.core.types import PoseMeasurement as PoseMeasurement
     from hil.core.types import ReferenceState as ReferenceState
     from hil.core.types import WheelSample as WheelSample
+    from hil.tools.conformance import check_cost as check_cost
     from hil.tools.conformance import check_estimator as check_estimator
+    from hil.tools.conformance import check_figure as check_figure
     from hil.tools.conformance import check_law as check_law
     from hil.tools.conformance import check_localiser as check_localiser
     from hil.tools.conformance import check_robot as check_robot

@@ -15,7 +15,7 @@ from __future__ import annotations
 import functools
 import math
 import operator
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -25,7 +25,8 @@ from hil.analysis import sliding
 from hil.analysis.pieces import percentiles, pieces, row_count
 from hil.analysis.sliding import LawFacts
 from hil.core.errors import BadInput
-from hil.core.figures import BY_NAME, METRICS, require_known
+from hil.core.figures import BY_NAME, METRICS, Metric, metric_of
+from hil.core.registries import FIGURES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Columns = Mapping[str, Array]
 
+Basis = Literal["truth", "estimate"]
 LAST_S = 1.0  # "over the last second"
 _BANDS = {"settling_50mm_s": 0.050, "settling_20mm_s": 0.020}  # m
 
@@ -55,18 +57,42 @@ class LinkStats:
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """Values by metric name, and whether they rest on "truth" or on the "estimate"."""
+    """Values by metric name, and whether they rest on "truth" or on the "estimate".
 
-    basis: Literal["truth", "estimate"]
+    `own` declares those beside METRICS that the run's scenario asked for.
+    """
+
+    basis: Basis
     values: dict[str, float]
+    own: tuple[Metric, ...] = ()
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        """Return what each value is, the built-in ones first."""
+        return (*METRICS, *self.own)
+
+    def metric(self, name: str) -> Metric | None:
+        """Return what a value is, None where this run has no figure of the name."""
+        return BY_NAME.get(name) or next((own for own in self.own if own.name == name), None)
+
+    def with_own(self, own: Sequence[Metric], values: Mapping[str, float]) -> Figures:
+        """Return the figures with others beside them; one without a value is NaN."""
+        found = {metric.name: values.get(metric.name, math.nan) for metric in own}
+        return Figures(self.basis, self.values | found, tuple(own))
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of metrics.json: value and unit by name, NaN as null."""
         figures = {
             metric.name: {"value": _finite(self.values[metric.name]), "unit": metric.unit}
-            for metric in METRICS
+            for metric in self.metrics
         }
         return {"basis": self.basis, "figures": figures}
+
+
+def all_metrics(runs: Iterable[Figures]) -> tuple[Metric, ...]:
+    """Return what the values of several runs are, each once, the built-in ones first."""
+    own = {metric.name: metric for run in runs for metric in run.own}
+    return (*METRICS, *own.values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +145,53 @@ def compute(
         | _timing_figures(columns, link or LinkStats())
     )
     return Figures("truth" if true_error else "estimate", values)
+
+
+@dataclass(frozen=True, slots=True)
+class RunData:
+    """What a figure of merit is computed from: a whole run.
+
+    `columns` are those of samples.parquet by name, one float64 value a tick, NaN where there is none, in
+    the units that the names say (docs/run-record.md); they cannot be written to. `scenario` is the
+    resolved scenario as a tree, `figures` are the built-in figures by name, `link` the counters of the
+    link.
+    """
+
+    columns: Columns
+    scenario: Mapping[str, Any]
+    figures: Mapping[str, float]
+    basis: Basis
+    link: LinkStats
+    law: LawFacts
+
+    @property
+    def t_s(self) -> Array:
+        """Return the time of each tick, s, from 0."""
+        return self.columns["t_s"]
+
+    @property
+    def error_m(self) -> Array:
+        """Return |delta1| = |z1 - z1*| at each tick, m, from the truth where there is one."""
+        return error_norm(self.columns)
+
+    def of_robot(self, name: str) -> Array:
+        """Return `true_NAME` where the truth is known, else `est_NAME`: x_m, y_m, theta_rad, ..."""
+        return self.columns[f"{'true' if self.basis == 'truth' else 'est'}_{name}"]
+
+
+def _built_in(name: str) -> Callable[[RunData], float]:
+    """Return a built-in figure as a function, as one from a file is."""
+
+    def give(run: RunData) -> float:
+        return compute(run.columns, run.link, run.law).values[name]
+
+    return give
+
+
+for _metric in METRICS:
+    FIGURES.register(_metric.name, summary=_metric.definition, label=_metric.label, metric=_metric)(
+        _built_in(_metric.name)
+    )
 
 
 def no_figures(columns: Columns) -> Figures:
@@ -319,17 +392,17 @@ def check(figures: Figures, scenario: Mapping[str, Any]) -> tuple[Verdict, ...]:
     """Return the verdict on each requirement of a resolved scenario tree.
 
     `requirements` name a figure with `min`, `max` or both, in the figure's own unit. Raises BadInput
-    for an unknown figure.
+    for a figure that the run does not have.
     """
     return tuple(_judge(figures, item) for item in scenario.get("requirements", ()))
 
 
 def _judge(figures: Figures, item: Mapping[str, Any]) -> Verdict:
-    name = require_known(str(item["metric"]))
+    metric = figures.metric(str(item["metric"])) or metric_of(str(item["metric"]))
     low, high = item.get("min"), item.get("max")
-    value = figures.values[name]
+    value = figures.values.get(metric.name, math.nan)
     holds = (low is None or value >= low) and (high is None or value <= high)
-    return Verdict(name, value, BY_NAME[name].unit, low, high, holds and not math.isnan(value))
+    return Verdict(metric.name, value, metric.unit, low, high, holds and not math.isnan(value))
 
 
 def all_hold(verdicts: Sequence[Verdict]) -> bool:

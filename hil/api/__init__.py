@@ -183,12 +183,13 @@ def make_env(
     inner: str = "asg-ism",
     on: str = "twin",
     camera: str | None = None,
+    cost: str = "usual",
     **overrides: Any,
 ) -> HilEnv:
     """Return a scenario as a Gymnasium environment (`hil.study.gym_env.HilEnv` says what is what).
 
     One step is one outer tick, the action is forward speed and turn rate, the rewards add up to minus
-    the cost that `hil tune` minimises. Raises BadInput, also without the extra `gym`.
+    the cost that `hil tune --cost COST` minimises. Raises BadInput, also without the extra `gym`.
     """
     try:
         from hil.study.gym_env import HilEnv  # noqa: PLC0415 - needs an extra
@@ -196,7 +197,10 @@ def make_env(
         raise BadInput(
             f"make_env: {error.name} is not installed; pip install 'skid-steer-hil[gym]'"
         ) from None
-    return HilEnv(_spec(load_scenario(scenario, **overrides), None, inner, on, camera, seed))
+    from hil.study.costs import cost_of  # noqa: PLC0415
+
+    spec = _spec(load_scenario(scenario, **overrides), None, inner, on, camera, seed)
+    return HilEnv(spec, cost_of(cost))
 
 
 # -- inside ------------------------------------------------------------------------------------------

@@ -6,13 +6,20 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hil.cli.options import json_option, plain_console, print_json, set_option
+from hil.cli.options import (
+    figure_option,
+    json_option,
+    plain_console,
+    print_json,
+    set_option,
+    with_figures,
+)
 from hil.core.text import visible
 
 if TYPE_CHECKING:
     from hil.tools.conformance import Report
 
-KINDS = ("law", "estimator", "localiser", "robot")
+KINDS = ("law", "estimator", "localiser", "robot", "figure", "cost")
 
 
 @click.command("check")
@@ -21,20 +28,28 @@ KINDS = ("law", "estimator", "localiser", "robot")
 @click.option("--scenario", default=None, metavar="SCENARIO",
               help="What it must do (a robot: the three experiments).  [default: scenario-1]")  # fmt: skip
 @set_option
+@figure_option
 @json_option
 def command(
-    kind: str, thing: str, scenario: str | None, overrides: tuple[str, ...], as_json: bool
+    kind: str,
+    thing: str,
+    scenario: str | None,
+    overrides: tuple[str, ...],
+    own_figures: tuple[str, ...],
+    as_json: bool,
 ) -> int:
     """Check what is in FILE (FILE.py, FILE.py:NAME, a robot's FILE.toml) or has this name.
 
     A law must be finite, deterministic, as new after a reset, share no state, read no clock and no
     random number without a seed, keep to its limits, mirror with the scene, be quick, hold the
-    scenario, differ from itself by exactly nothing, and fail with its turn the other way. Exit
+    scenario, differ from itself by exactly nothing, and fail with its turn the other way. A figure or
+    a cost must be finite, deterministic, and tell a run from one with its turn the other way. Exit
     status: 0 all checks hold, 1 one does not, 2 no such thing. In a test of your own:
     hil.check_law("FILE.py").
     """
     from hil.tools import conformance
 
+    overrides = with_figures(overrides, own_figures)
     if kind == "robot":
         if scenario is not None:
             raise click.UsageError("--scenario: a robot is checked in the three experiments")
@@ -44,6 +59,8 @@ def command(
             "law": conformance.law_report,
             "estimator": conformance.estimator_report,
             "localiser": conformance.localiser_report,
+            "figure": conformance.figure_report,
+            "cost": conformance.cost_report,
         }[kind]
         report = make(thing, scenario=scenario or "scenario-1", overrides=overrides)
     if as_json:

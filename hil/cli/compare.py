@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hil.cli.ci import junit_file, junit_option, tell_ci
-from hil.cli.options import figures_option, json_option, print_json
+from hil.cli.options import figure_option, figures_option, json_option, print_json
 from hil.core.text import visible
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
               metavar="FILE.csv", help="Write every run's figures as CSV.")  # fmt: skip
 @click.option("--rerun", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.rrd",
               help="Write all runs as one recording for the viewer, on a common timeline.")  # fmt: skip
+@figure_option
 @figures_option
 @junit_option
 @json_option
@@ -31,6 +32,7 @@ def command(
     report: Path | None,
     csv_file: Path | None,
     rerun: Path | None,
+    own_figures: tuple[str, ...],
     figures: Path | None,
     junit: Path | None,
     as_json: bool,
@@ -38,8 +40,9 @@ def command(
     """Compare two or more run records of one scenario.
 
     Runs of two or more seeds per law, the same ones for each, are also compared as repeats: paired
-    by seed, with 95 % intervals.
+    by seed, with 95 % intervals. A --figure is computed from the records, whenever they were made.
     """
+    from hil.core.figures import metric_of
     from hil.record.manifest import command_line
     from hil.record.reader import read_run
     from hil.report.csv_table import write_csv
@@ -49,7 +52,8 @@ def command(
     from hil.study.experiment import study
 
     with junit_file(junit, "compare"):
-        records = [read_run(run) for run in runs]
+        more = [metric_of(name) for name in own_figures]
+        records = [read_run(run).with_own_figures(more) for run in runs]
     found = study(records)
     repeats = [found.repeats] if found.repeats else []
     with figures_kept(figures):
@@ -84,6 +88,7 @@ def print_study(study: Study) -> None:
     from rich.console import Console
     from rich.markup import escape
 
+    from hil.core.figures import BY_NAME
     from hil.report.compare import HEADLINES, findings, text_table
     from hil.report.repeats import text_tables
 
@@ -103,6 +108,7 @@ def print_study(study: Study) -> None:
             )
         for line in repeats.warnings:
             console.print(f"[yellow]note:[/yellow] {escape(visible(line))}")
-        for table in text_tables(repeats, list(HEADLINES)):
+        own = [metric.name for metric in repeats.metrics if metric.name not in BY_NAME]
+        for table in text_tables(repeats, [*HEADLINES, *own]):
             console.print(table)
     console.print()

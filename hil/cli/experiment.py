@@ -11,6 +11,7 @@ from hil.cli.compare import print_study
 from hil.cli.options import (
     INNER_LAWS,
     camera_option,
+    figure_option,
     figures_option,
     json_option,
     out_option,
@@ -20,6 +21,7 @@ from hil.cli.options import (
     set_option,
     target_option,
     warn_unfinished,
+    with_figures,
 )
 from hil.cli.progress import run_progress
 from hil.core.text import visible
@@ -43,6 +45,7 @@ UNTIL_MOST = 1000
               help="The figure that --until-interval looks at.")  # fmt: skip
 @seed_option
 @set_option
+@figure_option
 @out_option
 @figures_option
 @junit_option
@@ -58,6 +61,7 @@ def command(
     until_figure: str,
     seed: int,
     overrides: tuple[str, ...],
+    own_figures: tuple[str, ...],
     out: Path | None,
     figures: Path | None,
     junit: Path | None,
@@ -90,6 +94,7 @@ def command(
     from hil.study.side_by_side import run_all, run_name
     from hil.study.until import Until
 
+    overrides = with_figures(overrides, own_figures)
     until = None if until_interval is None else Until.of(until_figure, until_interval, target)
     most = repeats if until is None or repeats > 1 else UNTIL_MOST
     conditions = Conditions(target, camera, inner, seed, most, overrides, command_line())

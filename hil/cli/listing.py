@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 KINDS = (
     "laws", "wheel-laws", "estimators", "localisers", "references", "vehicles", "targets",
-    "scenarios", "robots", "decks", "campaigns", "figures",
+    "figures", "costs", "scenarios", "robots", "decks", "campaigns",
 )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ import click
 
 from hil.core.text import visible
 
-KINDS = ("law", "scenario", "robot", "localiser", "estimator", "plant")
+KINDS = ("law", "scenario", "robot", "localiser", "estimator", "plant", "figure", "cost")
 
 
 @click.command("new")
@@ -16,7 +16,7 @@ KINDS = ("law", "scenario", "robot", "localiser", "estimator", "plant")
 @click.argument("name")
 @click.option("--robot", metavar="FILE.toml", help="Of a scenario: the robot that drives it.")
 def command(kind: str, name: str, robot: str | None) -> int:
-    """Write NAME.py (a law, localiser, estimator or plant) or NAME.toml (a scenario or robot) here.
+    """Write NAME.py (a law, localiser, estimator, plant, figure or cost) or NAME.toml (a scenario or robot).
 
     What is written runs as it stands; its first lines say with which command. A file that is there
     already is left alone, and a name that is taken is refused.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -46,6 +46,11 @@ set_option = click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE",
     help="Change any scenario or robot value by dotted name, for example robot.mass_kg=3.1.",
 )  # fmt: skip
+figure_option = click.option(
+    "--figure", "own_figures", multiple=True, metavar="FIGURE",
+    help="Figure of merit beside the built-in ones: FILE.py, FILE.py:NAME, or a name that `hil list "
+    "figures` shows; may be repeated.",
+)  # fmt: skip
 out_option = click.option(
     "--out", type=click.Path(path_type=Path), metavar="DIR",
     help="Folder for the record(s); must not exist or be empty. [default: a new one in runs/]",
@@ -57,6 +62,11 @@ figures_option = click.option(
 )  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True,
                            help="One JSON document on stdout, nothing else.")  # fmt: skip
+
+
+def with_figures(overrides: Sequence[str], figures: Sequence[str]) -> tuple[str, ...]:
+    """Return the --set texts with those of --figure among them."""
+    return (*overrides, *([f"figures={json.dumps(list(figures))}"] if figures else []))
 
 
 def plain_console() -> Console:

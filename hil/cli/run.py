@@ -13,6 +13,7 @@ import click
 from hil.cli.ci import junit_file, junit_option, tell_ci
 from hil.cli.options import (
     camera_option,
+    figure_option,
     inner_option,
     json_option,
     out_option,
@@ -22,6 +23,7 @@ from hil.cli.options import (
     seed_option,
     set_option,
     target_option,
+    with_figures,
 )
 from hil.cli.progress import run_progress
 from hil.core.text import visible
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
 @camera_option
 @seed_option
 @set_option
+@figure_option
 @out_option
 @click.option("--record-camera", is_flag=True,
               help="Keep every frame in camera.mkv, lossless: 17 MB a second at 640 x 480.")  # fmt: skip
@@ -60,6 +63,7 @@ def command(
     camera: str | None,
     seed: int,
     overrides: tuple[str, ...],
+    own_figures: tuple[str, ...],
     out: Path | None,
     record_camera: bool,
     small_video: bool,
@@ -80,7 +84,7 @@ def command(
     if record_camera and small_video:
         raise click.UsageError("--record-camera and --record-camera-small: choose one")
     law = OUTER_LAWS.get(outer) if outer else None
-    resolved = load_scenario(scenario, overrides)
+    resolved = load_scenario(scenario, with_figures(overrides, own_figures))
     law = law or OUTER_LAWS.get(resolved.control.outer)
     spec = RunSpec(
         scenario=resolved,

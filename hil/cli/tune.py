@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hil.cli.options import json_option, outers_option, print_json, set_option
+from hil.cli.options import (
+    figure_option,
+    json_option,
+    outers_option,
+    print_json,
+    set_option,
+    with_figures,
+)
 from hil.core.text import visible
 
 if TYPE_CHECKING:
@@ -19,7 +26,8 @@ if TYPE_CHECKING:
     from hil.cli.progress import Stage
     from hil.config.gains import Gains
     from hil.core.figures import Metric
-    from hil.study.tune import Figures, Plan, Trial
+    from hil.study.costs import Figures
+    from hil.study.tune import Plan, Trial
     from hil.study.tune_work import Journal, Tasks
     from hil.study.tuning_verdict import Verdict
 
@@ -30,6 +38,9 @@ if TYPE_CHECKING:
               help="Robot in place of each scenario's own: a TOML file, or built in.")  # fmt: skip
 @outers_option
 @set_option
+@figure_option
+@click.option("--cost", "cost_name", default="usual", show_default=True, metavar="COST",
+              help="What is minimised: a name of `hil list costs`, FILE.py or FILE.py:NAME.")  # fmt: skip
 @click.option("--candidates", type=click.IntRange(11, 100_000), default=301, show_default=True,
               help="Candidates for each law; each runs every case with every seed.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(1, 2**31 - 1), default=1, show_default=True,
@@ -48,6 +59,8 @@ def command(
     robot: str | None,
     outers: tuple[str, ...],
     overrides: tuple[str, ...],
+    own_figures: tuple[str, ...],
+    cost_name: str,
     candidates: int,
     seed: int,
     repeats: int,
@@ -74,6 +87,7 @@ def command(
     """
     from hil.core.errors import BadInput
     from hil.study.campaign.results import program
+    from hil.study.costs import cost_of
     from hil.study.tune import SEARCH, Plan, boxes_of, write_gain_set
     from hil.study.tune_work import Journal, identity_of, load_tasks
     from hil.study.work_folder import sigterm_stops, sole_writer
@@ -82,12 +96,14 @@ def command(
         raise BadInput(f"--out {out}: exists already; name a new file")
     if not os.access(out.absolute().parent, os.W_OK):
         raise BadInput(f"--out {out}: no folder {out.absolute().parent} that can be written to")
+    cost = cost_of(cost_name)
     laws = tuple(boxes_of(outers)) or tuple(SEARCH)
-    asked = load_tasks(tasks, robot, overrides)
-    plan = Plan(cases=asked.cases(), candidates=candidates, search_seed=seed)
+    asked = load_tasks(tasks, robot, with_figures(overrides, own_figures))
+    plan = Plan(cases=asked.cases(), candidates=candidates, search_seed=seed, cost=cost)
     with sole_writer(out.with_name(f"{out.name}.lock"), f"--out {out}"), sigterm_stops():
         identity = identity_of(asked, plan, camera, program(), laws)
-        with Journal(out.with_name(f"{out.name}.search"), identity) as journal:
+        kept = out.with_name(f"{out.name}.search")
+        with Journal(kept, identity, every_figure=not cost.is_usual) as journal:
             for note in journal.notes:
                 click.echo(f"note: {note}", err=True)
             if len(journal):
@@ -123,7 +139,7 @@ def _searched(
     from hil.study.tuning_verdict import held_out_trials, judge, pairs_of, with_verdict
 
     worker: Any = tune.OnTarget("twin", camera, dict(tasks.known) if tasks.own else {})
-    if tasks.conditions:
+    if tasks.conditions and plan.cost.is_usual:
         worker = _by_task(tasks, worker, workers)
     with stage_progress() as stage, Pool(worker, workers or os.cpu_count() or 1) as pool:
         steps: dict[str, Stage] = {}
@@ -149,7 +165,7 @@ def _searched(
         trials = held_out_trials(gains, repeats, tasks.judged, run)
         step = stage("held-out tape", len(trials))
         figures = journal.make(trials, pool.map, step.advance)
-    verdicts = [judge(trials, figures, pair) for pair in pairs]
+    verdicts = [judge(trials, figures, pair, cost=plan.cost) for pair in pairs]
     for verdict in verdicts[::-1]:
         gains = with_verdict(gains, verdict)
     return gains, verdicts

@@ -149,8 +149,8 @@ _PLUGIN_KEYS = (
 )  # fmt: skip
 
 
-# Lists of outer laws: of a campaign, of a deck.
-_PLUGIN_LISTS = ("outer", "laws")
+# Lists of outer laws (of a campaign, of a deck), and of figures.
+_PLUGIN_LISTS = ("outer", "laws", "figures")
 
 
 def _set_files_beside(tree: Tree, folder: Path | None) -> None:
@@ -167,6 +167,9 @@ def _set_files_beside(tree: Tree, folder: Path | None) -> None:
             tree[key] = [
                 str(folder.resolve() / name) if is_file_name(str(name)) else name for name in names
             ]
+    for item in tree["requirements"] if isinstance(tree.get("requirements"), list) else ():
+        if folder is not None and isinstance(item, dict) and is_file_name(str(item.get("metric"))):
+            item["metric"] = str(folder.resolve() / item["metric"])
     if folder is not None and is_file_name(str(tree.get("plant", ""))):  # of a robot
         tree["plant"] = str(folder.resolve() / tree["plant"])
 

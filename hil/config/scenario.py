@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, SerializeAsAny, field_validator, model_validator
+from pydantic import AfterValidator, Field, SerializeAsAny, model_validator
 
 from hil.config.base import PlainName, Section, quantity
 from hil.config.camera import CameraConfig
@@ -14,7 +14,7 @@ from hil.config.events import Disturbance, Fault
 from hil.config.link import LinkConfig
 from hil.config.robot import RobotConfig
 from hil.core.errors import BadInput
-from hil.core.figures import BY_NAME, require_known
+from hil.core.figures import BY_NAME, metric_of, require_known
 from hil.core.registries import Sources, adopt_sources, file_sources
 
 
@@ -26,26 +26,33 @@ class StartPose(Section):
     theta_rad: float = quantity("rad", "heading, counter-clockwise from world +X", ge=-7, le=7)
 
 
+def _figure(name: str) -> str:
+    try:
+        return require_known(name)
+    except BadInput as error:
+        raise ValueError(str(error)) from None
+
+
+# The name of a figure of merit; a file becomes the name of the figure in it.
+FigureName = Annotated[str, AfterValidator(_figure)]
+
+
 class Requirement(Section):
     """One figure of the run that must hold; the verdict is pass when min <= value <= max."""
 
-    metric: str = Field(description="name of a figure of metrics.json")
+    metric: FigureName = Field(description="figure of metrics.json, or FILE.py[:NAME] that has one")
     min: float | None = quantity("", "lowest value that holds, in the figure's unit", None)
     max: float | None = quantity("", "highest value that holds, in the figure's unit", None)
 
     @classmethod
     def unit_of(cls, name: str, table: Mapping[str, Any]) -> str:
         """Return the unit of a value; a bound has that of its figure."""
-        figure = BY_NAME.get(str(table.get("metric")))
-        return figure.unit if figure and name in {"min", "max"} else super().unit_of(name, table)
-
-    @field_validator("metric")
-    @classmethod
-    def _is_a_figure(cls, name: str) -> str:
+        if name not in {"min", "max"}:
+            return super().unit_of(name, table)
         try:
-            return require_known(name)
-        except BadInput as error:
-            raise ValueError(str(error)) from None
+            return metric_of(str(table.get("metric"))).unit
+        except BadInput:
+            return super().unit_of(name, table)
 
     @model_validator(mode="after")
     def _can_hold_and_fail(self) -> Self:
@@ -106,6 +113,9 @@ class Scenario(Section):
     duration_s: float = quantity("s", "length of the controlled part", gt=0, le=36_000)
     start: StartPose
     reference: SerializeAsAny[ReferenceConfig]
+    figures: tuple[FigureName, ...] = Field(
+        (), description="figures of merit beside the built-in ones: names, or FILE.py[:NAME]"
+    )
     requirements: tuple[Requirement, ...] = ()
     robot: RobotConfig
     mismatch: dict[str, float] = Field(
@@ -124,6 +134,12 @@ class Scenario(Section):
     safety: SafetyConfig = SafetyConfig()
     disturbances: tuple[Disturbance, ...] = ()
     faults: tuple[Fault, ...] = ()
+
+    @property
+    def own_figures(self) -> tuple[str, ...]:
+        """Return the names of the figures that are asked for beside the built-in ones, each once."""
+        asked = (*self.figures, *(item.metric for item in self.requirements))
+        return tuple(name for name in dict.fromkeys(asked) if name not in BY_NAME)
 
     def __reduce__(self) -> Any:
         """Pickle with the texts of what came from files: another process gets to know it by them."""

@@ -20,7 +20,7 @@ from hil.console.folders import Folders
 from hil.console.hand_over import floor_of
 from hil.console.people import plain
 from hil.core.errors import BadInput, HilError
-from hil.core.figures import BY_NAME
+from hil.core.figures import metric_of
 from hil.core.files import read_bounded
 from hil.tools.doctor import examine
 from hil.tools.inventory import listing
@@ -182,7 +182,7 @@ def describe(name: str) -> dict[str, Any]:
 def _requirement(item: dict[str, Any]) -> str:
     low = f"{item['min']:g} <= " if item["min"] is not None else ""
     high = f" <= {item['max']:g}" if item["max"] is not None else ""
-    return f"{low}{item['metric']}{high} {BY_NAME[item['metric']].unit}".strip()
+    return f"{low}{item['metric']}{high} {metric_of(item['metric']).unit}".strip()
 
 
 def _settings_by_key() -> dict[str, list[Setting]]:

@@ -1,14 +1,22 @@
-"""The figures of merit: name, unit and meaning of each. How they are computed: `hil.analysis.metrics`."""
+"""The figures of merit: name, unit and meaning of each. How they are computed: `hil.analysis.metrics`.
+
+METRICS are the built-in ones, which every run has. One of a lab's own (`@hil.figure`) is computed where a
+scenario names it, and a cost of its own (`@hil.tuning_cost`) makes one number of a run's figures.
+"""
 
 from __future__ import annotations
 
 import difflib
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar
 
 from hil.core.errors import BadInput
+from hil.core.registries import FIGURES, TUNING_COSTS
+from hil.core.registry import Entry, is_file_name
 
+Thing = TypeVar("Thing", bound=Callable[..., object])
 Better = Literal["lower", "higher", "neither"]
 
 
@@ -112,18 +120,84 @@ METRICS = (
 BY_NAME = {metric.name: metric for metric in METRICS}
 
 
+def figure(
+    name: str, *, unit: str, meaning: str, smaller_is_better: bool | None = True, label: str = ""
+) -> Callable[[Thing], Thing]:
+    """Return the decorator that makes a function of `hil.RunData` a figure of merit.
+
+    The function gives one number in `unit` ("" without one), NaN where a run has none. `meaning` says
+    how it is defined, `smaller_is_better` which way is better (None: neither), `label` how tables call it.
+    Raises BadInput for a name that cannot be a column, an empty meaning, or a name that is taken.
+    """
+    _require_words("figure", name, unit=unit, meaning=meaning, label=label)
+    if smaller_is_better not in (True, False, None):
+        raise BadInput(
+            f"figure {name}: smaller_is_better = {smaller_is_better!r}: True, False, or None for neither"
+        )
+    ways: dict[bool | None, Better] = {True: "lower", False: "higher", None: "neither"}
+    better = ways[smaller_is_better]
+    metric = Metric(name, unit, label or name, meaning, better)
+    return FIGURES.register(name, summary=meaning, label=metric.label, metric=metric)
+
+
+def tuning_cost(name: str, *, meaning: str, failed: float) -> Callable[[Thing], Thing]:
+    """Return the decorator that makes a function of a run's figures what `hil tune` minimises.
+
+    The function is given the figures by name and gives one number, less is better. `failed` is what a run
+    costs that has no cost (it ended early, a figure in use is NaN), and the most that any run costs.
+    Raises BadInput for a name that is none or taken, and for a `failed` that is no finite number.
+    """
+    _require_words("tuning cost", name, meaning=meaning)
+    if isinstance(failed, bool) or not isinstance(failed, int | float) or not math.isfinite(failed):
+        raise BadInput(
+            f"tuning cost {name}: failed = {failed!r}: needs a finite number, more than a good run costs"
+        )
+    return TUNING_COSTS.register(name, summary=meaning, failed=float(failed))
+
+
+def _require_words(kind: str, name: str, **said: str) -> None:
+    if not isinstance(name, str) or not name.replace("-", "_").isidentifier():
+        raise BadInput(
+            f"{kind} {name!r}: a name begins with a letter and has letters, digits and _ alone"
+        )
+    if kind == "figure" and "-" in name:
+        raise BadInput(f"figure {name!r}: is a column of tables too: write _ in place of -")
+    for key, text in said.items():
+        if not isinstance(text, str) or "\n" in text or (key == "meaning" and not text.strip()):
+            raise BadInput(f"{kind} {name}: {key} = {text!r}: needs a text of one line")
+
+
+def metric_of(name: str) -> Metric:
+    """Return a figure by its name, also one of a file or package that is known; raises BadInput."""
+    if name in BY_NAME:
+        return BY_NAME[name]
+    return declared(FIGURES.get(require_known(name)))
+
+
+def declared(entry: Entry) -> Metric:
+    """Return what a registered figure says of itself."""
+    metric: Metric = entry.extra["metric"]
+    return metric
+
+
+def require_known(name: str) -> str:
+    """Return the name of a figure, a file's by `FILE.py[:NAME]`; raises BadInput with near names."""
+    if name in BY_NAME:
+        return name
+    if is_file_name(name) or name in FIGURES.names():
+        return FIGURES.get(name).name
+    names = FIGURES.names()
+    near = difflib.get_close_matches(name, names, n=3, cutoff=0.4)
+    hint = f"near: {', '.join(near)}" if near else f"known: {', '.join(names)}"
+    raise BadInput(
+        f"figure {name!r}: no such figure, built in or in an installed package ({FIGURES.group}); {hint}; "
+        f"or name a file: ./{name}.py"
+    )
+
+
 def _three_digits(value: float) -> str:
     """Return 3 significant digits without an exponent where a person would not write one."""
     size = abs(value)
     if size == 0 or float(f"{size:.3g}").is_integer():
         return f"{value:,.0f}" if size < 1e9 else f"{value:.3g}"
     return f"{value:.3g}" if 1e-3 <= size < 1e3 else f"{value:.2e}"
-
-
-def require_known(name: str) -> str:
-    """Return the name of a figure as it is; raises BadInput with near names when unknown."""
-    if name in BY_NAME:
-        return name
-    near = difflib.get_close_matches(name, BY_NAME, n=3, cutoff=0.4)
-    hint = f"near: {', '.join(near)}" if near else f"known: {', '.join(BY_NAME)}"
-    raise BadInput(f"requirement {name!r}: no such figure; {hint}")

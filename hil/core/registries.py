@@ -23,6 +23,8 @@ REFERENCES = Registry("reference", "skid_steer_hil.references", "hil.control.ref
 LOCALISERS = Registry("localiser", "skid_steer_hil.localisers", "vision.localisers", ("locate",))
 VEHICLES = Registry("vehicle", "skid_steer_hil.vehicles", "hil.control.vehicles")
 TARGETS = Registry("target", "skid_steer_hil.targets", "hil.rigs.targets")
+FIGURES = Registry("figure of merit", "skid_steer_hil.figures", "hil.analysis.metrics")
+TUNING_COSTS = Registry("tuning cost", "skid_steer_hil.tuning_costs", "hil.study.costs")
 
 # As `hil list` names them.
 BY_PLURAL = {
@@ -32,6 +34,8 @@ BY_PLURAL = {
     "localisers": LOCALISERS,
     "vehicles": VEHICLES,
     "targets": TARGETS,
+    "figures": FIGURES,
+    "costs": TUNING_COSTS,
 }
 BY_KIND = {registry.kind: registry for registry in BY_PLURAL.values()}
 
@@ -56,7 +60,7 @@ def adopt_sources(sources: Sequence[tuple[str, SourceText]]) -> None:
         BY_KIND[kind].adopt(source)
 
 
-def source_digests(names: Sequence[str]) -> dict[str, str]:
-    """Return the digest of the text of each outer law among `names` that came from a file."""
-    entries = [OUTER_LAWS.get(name) for name in names]
+def source_digests(names: Sequence[str], registry: Registry = OUTER_LAWS) -> dict[str, str]:
+    """Return the digest of the text of each thing (an outer law) among `names` that came from a file."""
+    entries = [registry.get(name) for name in names]
     return {entry.name: entry.source.sha256 for entry in entries if entry.source is not None}

@@ -33,6 +33,8 @@ Terms = Mapping[str, tuple[str, str]]
 
 BUILT_IN = "built in"
 _OWN_PACKAGES = ("hil", "vision", "sim_twin")
+# Module name -> text of each file that was run: one file may bring things of several kinds.
+_SOURCES: dict[str, SourceText] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +109,10 @@ class Registry:
         def enter(thing: Thing) -> Thing:
             origin, source = self._loading
             module = str(getattr(thing, "__module__", ""))
-            if origin == BUILT_IN and module.partition(".")[0] not in _OWN_PACKAGES:
+            if source is None and module in _SOURCES:  # of a file that another registry loads
+                source = _SOURCES[module]
+                origin = str(source.path)
+            elif origin == BUILT_IN and module.partition(".")[0] not in _OWN_PACKAGES:
                 origin = f"module {module}"  # decorated in a notebook or a script
             first_line = (thing.__doc__ or "").strip().split("\n")[0]
             self._enter(
@@ -341,12 +346,13 @@ def _execute(source: SourceText) -> ModuleType:
     module.__file__ = str(source.path)
     code = compile(source.text, str(source.path), "exec")
     sys.modules[name] = module  # dataclasses and pydantic look the module of a class up
+    _SOURCES[name] = source
     folder = str(source.path.parent)
     sys.path.insert(0, folder)
     try:
         exec(code, module.__dict__)
     except BaseException:
-        del sys.modules[name]
+        del sys.modules[name], _SOURCES[name]
         raise
     finally:
         sys.path.remove(folder)
@@ -367,6 +373,16 @@ def _place_in(source: SourceText, error: BaseException) -> str:
     lines = [frame.lineno for frame in frames if frame.filename == str(source.path)]
     where = f"line {lines[-1]}: " if lines else ""
     return f"{where}{in_one_line(error)}"
+
+
+def place_of(entry: Entry, error: BaseException | None = None) -> str:
+    """Return the file of a thing from outside, and the line in it that an error passed last."""
+    if entry.source is None:
+        return entry.origin
+    name, path = entry.source.path.name, str(entry.source.path)
+    frames = traceback.extract_tb(error.__traceback__) if error is not None else []
+    lines = [frame.lineno for frame in frames if frame.filename == path]
+    return f"{name}, line {lines[-1]}" if lines else name
 
 
 def renamed(entry: Entry, name: str) -> Entry:

@@ -24,6 +24,7 @@ from pydantic import (
 )
 
 from hil.core.errors import BadInput
+from hil.core.figures import Better, Metric
 from hil.core.files import RECORD_BYTES, read_bounded, replace_file
 from hil.core.registry import Entry
 from hil.record import layout
@@ -86,6 +87,31 @@ class TraceTerm(BaseModel):
     meaning: str
 
 
+class FigureTerm(BaseModel):
+    """A figure of merit beside the built-in ones: what metrics.json has of it is declared here."""
+
+    model_config = ConfigDict(frozen=True)
+
+    name: str
+    unit: str
+    label: str
+    meaning: str
+    better: Better
+
+    @classmethod
+    def of(cls, metric: Metric) -> FigureTerm:
+        """Return what the record says of a figure."""
+        return cls(
+            name=metric.name, unit=metric.unit, label=metric.label,
+            meaning=metric.definition, better=metric.better,
+        )  # fmt: skip
+
+    @property
+    def metric(self) -> Metric:
+        """Return the figure's declaration."""
+        return Metric(self.name, self.unit, self.label, self.meaning, self.better)
+
+
 class Manifest(BaseModel):
     """Everything that decides a run's result, and how the run ended.
 
@@ -108,6 +134,9 @@ class Manifest(BaseModel):
     plugins: list[Plugin] = Field(default_factory=list, description="what ran from outside")
     trace: list[TraceTerm] = Field(
         default_factory=list, description="the law's own columns, after those of every record"
+    )
+    figures: list[FigureTerm] = Field(
+        default_factory=list, description="figures of merit beside the built-in ones"
     )
     versions: dict[str, str] = Field(default_factory=dict)
     git_revision: str = ""

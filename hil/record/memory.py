@@ -133,4 +133,4 @@ class MemoryRecorder:
             samples=self.rows.columns(self.manifest.sample_names),
             frames=self.frames.columns(FRAME_NAMES),
             events=tuple(self.events),
-        )
+        ).with_own_figures()

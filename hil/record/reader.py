@@ -5,18 +5,21 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from hil.analysis import metrics
+from hil.analysis import metrics, own_figures
 from hil.analysis.pieces import row_count
 from hil.analysis.sliding import LawFacts
 from hil.core.errors import BadInput
+from hil.core.figures import Metric
+from hil.core.files import RECORD_BYTES, read_bounded
 from hil.record import layout
 from hil.record.journal import Columns, read_journal, read_parquet
-from hil.record.manifest import Manifest, file_entry, read_manifest
+from hil.record.manifest import FigureTerm, Manifest, file_entry, read_manifest
 from hil.record.schema import ADDED_LATER, FRAME_NAMES
 from hil.record.tick_rows import COVARIANCE
 
@@ -52,6 +55,7 @@ class RunRecord:
     events: tuple[Event, ...] = ()
     pictures: tuple[Picture, ...] = ()
     problems: tuple[str, ...] = ()
+    own: Mapping[str, float] = field(default_factory=dict)  # figures that the manifest declares
     _figures: list[metrics.Figures] = field(
         default_factory=list, init=False, repr=False, compare=False
     )
@@ -78,7 +82,11 @@ class RunRecord:
         return [event.text for event in self.events if event.kind == "diagnosis"]
 
     def figures(self) -> metrics.Figures:
-        """Return the figures, computed from the samples; all are NaN below two ticks."""
+        """Return the figures: built-in ones from the samples, all NaN below two ticks; then own ones."""
+        own = [term.metric for term in self.manifest.figures]
+        return self._built_in().with_own(own, self.own)
+
+    def _built_in(self) -> metrics.Figures:
         if not self._figures:
             self._figures.append(
                 metrics.no_figures(self.samples)
@@ -86,6 +94,36 @@ class RunRecord:
                 else metrics.compute(self.samples, self.link_stats(), self.law_facts())
             )
         return self._figures[0]
+
+    def data(self) -> metrics.RunData:
+        """Return what a figure of merit is given of the run."""
+        built_in = self._built_in()
+        return metrics.RunData(
+            columns=own_figures.read_only(self.samples),
+            scenario=self.manifest.scenario,
+            figures=dict(built_in.values),
+            basis=built_in.basis,
+            link=self.link_stats(),
+            law=self.law_facts(),
+        )
+
+    def with_own_figures(self, more: Sequence[Metric] = ()) -> RunRecord:
+        """Return the run with the figures computed that its manifest declares, and `more`.
+
+        Where one has no value, a note in the manifest says why.
+        """
+        terms = {term.name: term for term in self.manifest.figures}
+        terms |= {metric.name: FigureTerm.of(metric) for metric in more}
+        if not terms or row_count(self.samples) < 2:
+            return self
+        anew = {metric.name for metric in more}
+        asked = [t.metric for t in terms.values() if t.name not in self.own or t.name in anew]
+        found = own_figures.compute_own(asked, self.data())
+        notes = [*self.manifest.notes, *found.notes]
+        manifest = self.manifest.model_copy(
+            update={"figures": list(terms.values()), "notes": list(dict.fromkeys(notes))}
+        )
+        return replace(self, manifest=manifest, own={**self.own, **found.values})
 
     def verdicts(self) -> tuple[metrics.Verdict, ...]:
         """Return the verdict on each requirement of the scenario."""
@@ -146,7 +184,20 @@ def read_run(path: Path) -> RunRecord:
         events=read_events(path / layout.EVENTS),
         pictures=read_pictures(path / layout.PICTURES),
         problems=tuple(problems),
+        own=_read_own(path / layout.FIGURES, manifest),
     )
+
+
+def _read_own(path: Path, manifest: Manifest) -> dict[str, float]:
+    """Return the values of the figures that the manifest declares, as they were when it was closed."""
+    if not manifest.figures or not path.is_file():
+        return {}
+    try:
+        kept = json.loads(read_bounded(path, RECORD_BYTES))["figures"]
+        values = {term.name: kept[term.name]["value"] for term in manifest.figures}
+        return {name: math.nan if value is None else float(value) for name, value in values.items()}
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}  # its SHA-256 says so
 
 
 def completed_frames(frames: Columns) -> Columns:

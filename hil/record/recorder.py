@@ -230,7 +230,7 @@ class Recorder:
             frames=frames,
             events=read_events(self.path / layout.EVENTS),
             pictures=read_pictures(self.path / layout.PICTURES),
-        )
+        ).with_own_figures()
         self._write_figures(run)
         if self._rerun:
             from hil.record.rrd import write_rrd  # noqa: PLC0415 - half a second, only when used

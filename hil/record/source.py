@@ -5,13 +5,13 @@ from __future__ import annotations
 import copy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hil.config.gains import gains_model
 from hil.config.load import build
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
-from hil.core.registries import BY_KIND
+from hil.core.registries import BY_KIND, FIGURES
 from hil.core.registry import SourceText
 from hil.record import layout
 from hil.record.manifest import Manifest, read_manifest
@@ -74,9 +74,10 @@ def recorded_scenario(manifest: Manifest, where: Path) -> Scenario:
     """Return the scenario of a record; raises BadInput.
 
     Gains of laws that are not known here (they were files) are left out: only a replay needs them,
-    and it has them loaded first.
+    and it has them loaded first. So are figures that are not known here, with what they require.
     """
     tree = copy.deepcopy(manifest.scenario)
+    _leave_out_figures(tree)
     known = gains_model().model_fields
     for table in tree.get("control", {}).get("gains", {}).values():
         for key in [key for key in table if key not in known]:
@@ -84,11 +85,21 @@ def recorded_scenario(manifest: Manifest, where: Path) -> Scenario:
     return build(Scenario, tree, str(where / layout.MANIFEST))
 
 
+def _leave_out_figures(tree: dict[str, Any]) -> None:
+    """Take out of a scenario's tree what names a figure that is not known here, in place."""
+    known = FIGURES.names()
+    tree["figures"] = [name for name in tree.get("figures", []) if name in known]
+    tree["requirements"] = [
+        item for item in tree.get("requirements", []) if item["metric"] in known
+    ]
+
+
 def load_plugins(source: Source, *, recorded_code: bool = False) -> None:
     """Make the laws and other things from files known again, as they were when the record was made.
 
     The file must still stand where it was with the same text; with `recorded_code` the text in the
-    record is run instead. Raises BadInput.
+    record is run instead. A figure's file that is another by now is left aside: it judges a run and does
+    not make it. Raises BadInput.
     """
     for plugin in source.manifest.plugins:
         registry = BY_KIND.get(plugin.kind)
@@ -104,6 +115,8 @@ def load_plugins(source: Source, *, recorded_code: bool = False) -> None:
         path = Path(plugin.origin)
         now = path.read_text(encoding="utf-8") if path.is_file() else None
         if now is None or SourceText(path, now).sha256 != plugin.sha256:
+            if registry is FIGURES:
+                continue
             what = "is gone" if now is None else "has changed since"
             raise BadInput(
                 f"{plugin.kind} {plugin.name}: {path} {what}; the text that ran is {kept}: to run "

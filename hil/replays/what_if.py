@@ -176,7 +176,7 @@ def _runs(scenario: Scenario, outer: str, inner: str) -> list[RunRecord]:
 
 def _figures(run: RunRecord) -> dict[str, float]:
     if run.manifest.outcome != "complete":
-        return dict.fromkeys(BY_NAME, math.nan)
+        return dict.fromkeys(HEADLINES, math.nan)
     return run.figures().values
 
 

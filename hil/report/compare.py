@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hil.analysis.metrics import Figures, Verdict, check
+from hil.analysis.metrics import Figures, Verdict, all_metrics, check
 from hil.config.control import WaypointReference
 from hil.control.references import unfinished
 from hil.core.errors import BadInput
-from hil.core.figures import BY_NAME, METRICS, Metric
+from hil.core.figures import BY_NAME, Metric
 from hil.core.text import visible
 from hil.record import layout
 from hil.record.manifest import read_manifest
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from hil.record.reader import RunRecord
 
 _TASK_KEYS = ("name", "start", "reference", "duration_s")
-# What a law brings along; it is the subject of a comparison, not a condition of it.
-_OWN_KEYS = ("description", "requirements", "control.outer", "control.gain")
+# What a law brings along, and what runs are judged by: the subject of a comparison, no condition of it.
+_OWN_KEYS = ("description", "figures", "requirements", "control.outer", "control.gain")
 # The figures that decide the summary, with the question that each one answers.
 HEADLINES = {
     "delta1_worst_last_second_m": "accuracy",
@@ -78,6 +78,15 @@ class Comparison:
     def holds(self) -> bool:
         """Say whether every run met every requirement."""
         return all(entry.holds for entry in self.entries)
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        """Return every figure that some run has, the built-in ones first."""
+        return all_metrics(entry.figures for entry in self.entries)
+
+    def values(self, name: str) -> list[float]:
+        """Return a figure of each run, NaN where a run has none."""
+        return [entry.figures.values.get(name, math.nan) for entry in self.entries]
 
 
 def is_judged(run: RunRecord) -> bool:
@@ -263,8 +272,8 @@ def _is_never(metric: Metric, value: float) -> bool:
 def best_entry(comparison: Comparison, metric: Metric) -> int | None:
     """Return the index of the entry that is better than all others in a figure; None without one."""
     places = [place for place, entry in enumerate(comparison.entries) if entry.judged]
-    values = [comparison.entries[place].figures.values[metric.name] for place in places]
-    best = better_of(metric, values)
+    everyone = comparison.values(metric.name)
+    best = better_of(metric, [everyone[place] for place in places])
     return None if best is None else places[best]
 
 
@@ -367,13 +376,13 @@ def text_table(comparison: Comparison) -> Table:
     for entry in comparison.entries:
         table.add_column(shown_cell(entry.label), justify="right")
     table.add_column("unit")
-    for metric in METRICS:
-        values = [entry.figures.values[metric.name] for entry in comparison.entries]
+    for metric in comparison.metrics:
+        values = comparison.values(metric.name)
         best = best_entry(comparison, metric)
         cells = [metric.text(value, with_unit=False) for value in values]
         if best is not None:
             cells[best] = f"[bold green]{cells[best]}[/]"
-        table.add_row(metric.label, *cells, metric.shown_unit)
+        table.add_row(shown_cell(metric.label), *cells, shown_cell(metric.shown_unit))
     table.add_section()
     marks = ["[green]pass[/]" if entry.holds else "[red]fail[/]" for entry in comparison.entries]
     table.add_row("requirements", *marks, "")

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hil.analysis.metrics import all_metrics
 from hil.core.errors import BadInput
-from hil.core.figures import METRICS
 from hil.core.files import replace_file
 from hil.core.text import visible
 
@@ -34,10 +34,11 @@ def write_csv(path: Path, runs: Sequence[RunRecord]) -> None:
     """Write who each run was and its figures in their own units; a missing figure is empty."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["record", *_ABOUT, "basis", *(metric.name for metric in METRICS)])
-    for run in runs:
-        figures = run.figures()
-        values = [figures.values[metric.name] for metric in METRICS]
+    found = [run.figures() for run in runs]
+    names = [metric.name for metric in all_metrics(found)]
+    writer.writerow(["record", *_ABOUT, "basis", *names])
+    for run, figures in zip(runs, found, strict=True):
+        values = [figures.values.get(name, math.nan) for name in names]
         about = [_cell(getattr(run.manifest, name)) for name in _ABOUT]
         numbers = [repr(value) if math.isfinite(value) else "" for value in values]
         writer.writerow([_cell(str(run.path)), *about, figures.basis, *numbers])

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import jinja2
 from markupsafe import Markup
 
+from hil.analysis.metrics import all_metrics
 from hil.core.errors import BadInput
-from hil.core.figures import BY_NAME, METRICS
+from hil.core.figures import BY_NAME, Metric, metric_of
 from hil.core.files import replace_file
 from hil.core.text import visible
 from hil.report import figures as draw
@@ -81,7 +82,7 @@ def render(
         "parts": [_part(comparison) for comparison in comparisons],
         "repeats": {item.scenario_name: repeats_context(item) for item in repeats},
         "circle": _circle(circle) if circle is not None else None,
-        "metrics": METRICS,
+        "metrics": all_metrics(entry.figures for entry in _entries(comparisons)),
         "conditions": _conditions(comparisons),
         "command": command,
         "provenance": _provenance(comparisons),
@@ -162,9 +163,8 @@ def _colours(comparison: Comparison) -> list[int]:
     return [trace.colour for trace in draw.traces(comparison.entries)]
 
 
-def _cells(comparison: Comparison, name: str) -> list[Context]:
-    metric = BY_NAME[name]
-    values = [entry.figures.values[name] for entry in comparison.entries]
+def _cells(comparison: Comparison, metric: Metric) -> list[Context]:
+    values = comparison.values(metric.name)
     best = best_entry(comparison, metric)
     return [
         {"text": metric.text(value, with_unit=False), "best": index == best}
@@ -175,7 +175,7 @@ def _cells(comparison: Comparison, name: str) -> list[Context]:
 def _summary(comparisons: Sequence[Comparison]) -> Context:
     rows = []
     for comparison in comparisons:
-        columns = [_cells(comparison, name) for name in HEADLINES]
+        columns = [_cells(comparison, BY_NAME[name]) for name in HEADLINES]
         colours = _colours(comparison)
         for index, entry in enumerate(comparison.entries):
             rows.append(
@@ -212,10 +212,10 @@ def _part(comparison: Comparison) -> Context:
         "rows": [
             {
                 "label": metric.label,
-                "cells": _cells(comparison, metric.name),
+                "cells": _cells(comparison, metric),
                 "unit": metric.shown_unit,
             }
-            for metric in METRICS
+            for metric in comparison.metrics
         ],
         "requirements": _requirements(comparison),
         "findings": findings(comparison),
@@ -271,12 +271,18 @@ def _requirements(comparison: Comparison) -> list[Context]:
         {
             "text": verdict.text(),
             "cells": [
-                {"value": BY_NAME[own.name].text(own.value), "holds": own.holds}
-                for own in (entry.verdicts[index] for entry in comparison.entries)
+                {"value": _shown_value(entry, index), "holds": entry.verdicts[index].holds}
+                for entry in comparison.entries
             ],
         }
         for index, verdict in enumerate(comparison.entries[0].verdicts)
     ]
+
+
+def _shown_value(entry: Entry, index: int) -> str:
+    verdict = entry.verdicts[index]
+    metric = entry.figures.metric(verdict.name) or metric_of(verdict.name)
+    return metric.text(verdict.value)
 
 
 def _circle(circle: CircleStudy) -> Context:

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hil.analysis.intervals import FEW, coverage_of
+from hil.analysis.metrics import Figures, all_metrics
 from hil.analysis.stats import Adjusted, Paired, adjusted, paired
-from hil.core.figures import BY_NAME, METRICS, Metric
+from hil.core.figures import Metric
 from hil.report.arms import Arm, arm_names, arms_of, by_seed
 from hil.report.compare import differences, is_judged, is_open_loop, shown_cell
 
@@ -62,6 +63,11 @@ class Repeats:
     complete: dict[str, int]
     contrasts: tuple[Contrast, ...]
     warnings: tuple[str, ...]
+    metrics: tuple[Metric, ...]  # what the contrasts' figures are
+
+    def metric(self, name: str) -> Metric:
+        """Return one of `metrics`."""
+        return next(metric for metric in self.metrics if metric.name == name)
 
     def to_json(self) -> dict[str, Any]:
         """Return the statistics for a JSON document."""
@@ -92,13 +98,14 @@ def repeats_of(runs: Sequence[RunRecord]) -> Repeats | None:
         arm: {seed: _figures(run) for seed, run in by_seed.items()}
         for arm, by_seed in paired_runs.items()
     }
+    every = [run for by_seed in figures.values() for run in by_seed.values() if run is not None]
+    metrics = tuple(metric for metric in all_metrics(every) if metric.better != "neither")
     by_figure: dict[str, Values] = {
         metric.name: {
-            arm: {seed: values[metric.name] for seed, values in by_seed.items()}
+            arm: {seed: _value(found, metric.name) for seed, found in by_seed.items()}
             for arm, by_seed in figures.items()
         }
-        for metric in METRICS
-        if metric.better != "neither"
+        for metric in metrics
     }
     battery: Values = {
         arm: {seed: _battery_v(run) for seed, run in by_seed.items()}
@@ -117,6 +124,7 @@ def repeats_of(runs: Sequence[RunRecord]) -> Repeats | None:
             for name, sides in _questions(list(arms), names)
         ),
         warnings=tuple(_warnings(arms, names, common)),
+        metrics=metrics,
     )
 
 
@@ -176,11 +184,13 @@ def _battery_v(run: RunRecord) -> float:
     return round(float(known.mean()), 2) if known.size else math.nan
 
 
-def _figures(run: RunRecord) -> dict[str, float]:
+def _figures(run: RunRecord) -> Figures | None:
     """Return a run's figures; none of a run that says nothing of its law (see is_judged)."""
-    if not is_judged(run):
-        return dict.fromkeys(BY_NAME, math.nan)
-    return run.figures().values
+    return run.figures() if is_judged(run) else None
+
+
+def _value(found: Figures | None, name: str) -> float:
+    return math.nan if found is None else found.values.get(name, math.nan)
 
 
 def _holds(run: RunRecord) -> bool:
@@ -251,7 +261,7 @@ def _table(repeats: Repeats, contrast: Contrast, figures: Sequence[str]) -> Tabl
     for head in ("figure", "baseline", "other", "difference", "95 % interval", "effect", "unit"):
         table.add_column(head, justify="left" if head in {"figure", "unit"} else "right")
     for name in figures:
-        metric, result = BY_NAME[name], contrast.results[name]
+        metric, result = repeats.metric(name), contrast.results[name]
         shown = (result.baseline_mean, result.other_mean, result.mean)
         cells = [metric.text(value, with_unit=False) for value in shown]
         if contrast.is_interaction:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
 from hil.analysis.stats import Paired
-from hil.core.figures import BY_NAME, METRICS
 from hil.report import figures as draw
 from hil.report.compare import HEADLINES
 from hil.report.repeats import Contrast, Repeats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from hil.core.figures import Metric
 
 _REACH_PERCENT = 150.0  # further differences are drawn as leaving the axis
 
@@ -36,13 +38,13 @@ def repeats_context(repeats: Repeats) -> dict[str, Any]:
         "first_seed": repeats.seeds[0],
         "warnings": repeats.warnings,
         "svg": Markup(forest_figure(repeats, f"{repeats.scenario_name}-repeats")),
-        "contrasts": [_contrast(contrast) for contrast in repeats.contrasts],
+        "contrasts": [_contrast(contrast, repeats.metrics) for contrast in repeats.contrasts],
     }
 
 
-def _contrast(contrast: Contrast) -> dict[str, Any]:
+def _contrast(contrast: Contrast, metrics: Sequence[Metric]) -> dict[str, Any]:
     rows = []
-    for metric in METRICS:
+    for metric in metrics:
         result = contrast.results.get(metric.name)
         if result is None or result.pairs < 2:
             continue
@@ -80,7 +82,7 @@ def forest_figure(repeats: Repeats, name: str) -> str:
             _bar(axes, row, contrast.results[metric_name])
         axes.axvline(0.0, color=draw.INK, lw=0.8)
         axes.set_ylim(len(HEADLINES) - 0.5, -0.5)
-        labels = [BY_NAME[key].label for key in HEADLINES] if panel == 0 else []
+        labels = [repeats.metric(key).label for key in HEADLINES] if panel == 0 else []
         axes.set_yticks(range(len(HEADLINES)), labels or [""] * len(HEADLINES))
         axes.set_xlabel("difference in % of the baseline", labelpad=2)
         title = "interaction" if contrast.is_interaction else contrast.name.split(",")[0]

@@ -26,9 +26,17 @@ from hil.control.task_notes import notes
 from hil.control.vehicles.vehicle import make_vehicle
 from hil.core.clocks import CameraClock
 from hil.core.errors import stop_status
-from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES, VEHICLES
+from hil.core.figures import metric_of
+from hil.core.registries import ESTIMATORS, FIGURES, LOCALISERS, OUTER_LAWS, REFERENCES, VEHICLES
 from hil.core.registry import BUILT_IN, Entry, SourceText, in_one_line
-from hil.record.manifest import Manifest, Plugin, TraceTerm, collect_versions, git_revision
+from hil.record.manifest import (
+    FigureTerm,
+    Manifest,
+    Plugin,
+    TraceTerm,
+    collect_versions,
+    git_revision,
+)
 from hil.record.memory import MemoryRecorder
 from hil.record.recorder import Recorder
 from hil.record.schema import own_columns
@@ -244,7 +252,8 @@ def used_things(spec: RunSpec) -> list[tuple[str, Entry]]:
         (REFERENCES, spec.scenario.reference.kind),
         (VEHICLES, spec.scenario.robot.vehicle.kind),
     )
-    return [(registry.kind, registry.get(name)) for registry, name in used]
+    figures = ((FIGURES, name) for name in spec.scenario.own_figures)
+    return [(registry.kind, registry.get(name)) for registry, name in (*used, *figures)]
 
 
 def _plant_of(spec: RunSpec) -> list[Plugin]:
@@ -323,6 +332,7 @@ def make_manifest(spec: RunSpec) -> Manifest:
         },
         plugins=plugins_of(spec),
         trace=trace_terms(law),
+        figures=[FigureTerm.of(metric_of(name)) for name in spec.scenario.own_figures],
         open_loop_of=spec.target.removeprefix(REPLAY) if spec.target.startswith(REPLAY) else "",
         notes=notes(spec.scenario),
         versions=collect_versions(),

@@ -9,18 +9,14 @@ the board's own time-out (250 ms without a set-point) stops the robot.
 from __future__ import annotations
 
 import math
-import signal
-import threading
-import traceback
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from types import FrameType
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from hil.core.errors import HilError, RigFault
-from hil.core.registry import in_one_line
+from hil.core.registry import in_one_line, place_of
+from hil.core.time_limit import TooLongError, time_limit
 from hil.core.types import OuterCommand
 from hil.core.wording import past
 
@@ -35,10 +31,6 @@ Result = TypeVar("Result")
 STEP_MAX_S = 0.2
 # Set-points this far over a limit are a fault; less is rounding.
 _EXCESS = 1.0 + 1e-9
-
-
-class TooLongError(Exception):
-    """The time of a call is up."""
 
 
 class GuardedLaw:
@@ -98,33 +90,4 @@ class GuardedLaw:
             raise self._fault(f"{what} raised {in_one_line(error)}", error) from None
 
     def _fault(self, said: str, error: BaseException | None = None) -> RigFault:
-        entry = self._entry
-        place = entry.origin if entry.source is None else entry.source.path.name
-        if error is not None and entry.source is not None:
-            frames = traceback.extract_tb(error.__traceback__)
-            lines = [f.lineno for f in frames if f.filename == str(entry.source.path)]
-            if lines:
-                place = f"{place}, line {lines[-1]}"
-        return RigFault(f"law {entry.name} ({place}): {said}")
-
-
-@contextmanager
-def time_limit(seconds: float) -> Iterator[None]:
-    """Raise TooLongError in the body after `seconds`, where the system can (main thread, not Windows)."""
-    if (
-        not hasattr(signal, "setitimer")
-        or threading.current_thread() is not threading.main_thread()
-    ):
-        yield
-        return
-
-    def ring(_number: int, _frame: FrameType | None) -> None:
-        raise TooLongError
-
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        return RigFault(f"law {self._entry.name} ({place_of(self._entry, error)}): {said}")

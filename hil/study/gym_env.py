@@ -22,7 +22,7 @@ from hil.rigs.opening import is_simulated, open_rig, simulated_targets
 from hil.runs.execute import RunSpec, board_parameters, link_stats, make_manifest, make_parts
 from hil.runs.parts import Ending
 from hil.runs.session import Session
-from hil.study.tune import COST_WEIGHTS, run_cost
+from hil.study.costs import COST_WEIGHTS, USUAL, Cost
 from hil.wire.identity import board_hashes
 
 if TYPE_CHECKING:
@@ -94,9 +94,10 @@ class HilEnv(gymnasium.Env["Vector", "Vector"]):
       estimate at the instant at which the next command takes effect, and the reference then.
     - **Action**: forward speed, m/s, and turn rate, rad/s (counter-clockwise), within the scenario's
       `control.limits`; beyond them it is clipped. Not finite: BadInput.
-    - **Reward**: minus what the step adds to the cost of `hil tune` (`hil.study.tune.run_cost`): error over
-      time and variation of the commands as they come, the rest with the last step. The rewards of an
-      episode add up to minus the run's cost; that of an episode which a fault ends is `COST_FAILED`.
+    - **Reward**: minus what the step adds to the cost of `hil tune`: error over time and variation of the
+      commands as they come, the rest with the last step. The rewards of an episode add up to minus the
+      run's cost; that of an episode which a fault ends is the cost's `failed`. Another cost than the usual
+      one is a number of the whole run: all of it comes with the last step.
     - **End**: truncated after the scenario's duration; terminated by a fault (geofence, robot lost from
       sight, link lost), which `info["detail"]` names. The observation of the end is the last one there was.
     - **Seed**: `reset(seed=S)` is the run with seed S; without one the first episode has the
@@ -107,8 +108,8 @@ class HilEnv(gymnasium.Env["Vector", "Vector"]):
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium declares it
 
-    def __init__(self, spec: RunSpec) -> None:
-        """Take the run to step; raises BadInput for a target that is not simulated."""
+    def __init__(self, spec: RunSpec, cost: Cost = USUAL) -> None:
+        """Take the run to step and what it costs; raises BadInput for a target that is not simulated."""
         if not is_simulated(spec.target):
             raise BadInput(
                 f"environment on {spec.target!r}: a real robot does not wait for a learner; "
@@ -120,6 +121,7 @@ class HilEnv(gymnasium.Env["Vector", "Vector"]):
         self.action_space = gymnasium.spaces.Box(-fastest, fastest, dtype=np.float64)
         self.observation_space = gymnasium.spaces.Box(-_BOUNDS, _BOUNDS, dtype=np.float64)
         self._spec = spec
+        self._cost = cost
         self._episode: _Episode | None = None
         self._begun = False
 
@@ -138,7 +140,7 @@ class HilEnv(gymnasium.Env["Vector", "Vector"]):
             seed = int(self.np_random.integers(_SEEDS)) if first is None else first
         self._begun = True
         self.close()
-        self._episode = _Episode(replace(self._spec, seed=seed))
+        self._episode = _Episode(replace(self._spec, seed=seed), self._cost)
         return self._episode.observation, self._episode.info()
 
     def step(self, action: Vector) -> tuple[Vector, float, bool, bool, dict[str, Any]]:
@@ -174,8 +176,9 @@ class HilEnv(gymnasium.Env["Vector", "Vector"]):
 class _Episode:
     """One run under way."""
 
-    def __init__(self, spec: RunSpec) -> None:
+    def __init__(self, spec: RunSpec, cost: Cost) -> None:
         self.seed = spec.seed
+        self._cost = cost
         parameters = board_parameters(spec.scenario, spec.inner)
         manifest = make_manifest(spec).model_copy(update={"outer": OUTER, "plugins": []})
         self._recorder = MemoryRecorder(manifest)
@@ -232,6 +235,8 @@ class _Episode:
 
     def _cost_of_tick(self) -> float:
         """Return what the newest row adds to the cost: error over time, change of the command."""
+        if not self._cost.is_usual:
+            return 0.0
         now = self._recorder.rows[-1]
         before = self._recorder.rows[-2] if len(self._recorder.rows) > 1 else now
 
@@ -250,7 +255,7 @@ class _Episode:
         """Return what is missing to the cost of the whole run."""
         assert self.record is not None
         complete = self.record.manifest.outcome == "complete"
-        return run_cost(self.record.figures().values if complete else {}) - self._spent
+        return self._cost.of(self.record.figures().values if complete else {}) - self._spent
 
 
 def _error_m(row: Any) -> float:

@@ -23,31 +23,17 @@ from hil.core.files import replace_file
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import Box
 from hil.core.types import wrap_pi
+from hil.study.costs import USUAL, Cost, Figures
 
 if TYPE_CHECKING:
     from hil.config.gains import Gains
     from hil.config.robot import RobotConfig
     from hil.config.scenario import Scenario
 
-Figures = Mapping[str, float]
 # Figures of each run, in the order of the trials, named as in metrics.json; empty for a failed run.
 Evaluate = Callable[[Sequence["Trial"]], Sequence[Figures]]
 # (candidates done, best cost so far)
 Progress = Callable[[int, float], None]
-
-# A run's cost is the sum of weight * figure: error, time to come within 20 mm, where it rests (1 mm is
-# worth half a second of settling), and the variation of the commands (chatter) at about a tenth of the
-# whole in a calm run. ITAE in place of IAE would weigh the rest error by chance of the duration.
-COST_WEIGHTS = {
-    "iae_m_s": 1.0,
-    "settling_20mm_s": 0.1,
-    "delta1_worst_last_second_m": 50.0,
-    "eta1_variation_m_s": 0.2,
-    "theta_dot_variation_rad_s": 0.02,
-}
-# Cost of a run that gives no figure: a safety stop, a law that diverged, never within 20 mm.
-COST_FAILED = 20.0
-
 
 def boxes_of(laws: Sequence[str]) -> dict[str, Box]:
     """Return what is searched of each law, as the law declares it; raises BadInput for one without."""
@@ -139,6 +125,7 @@ class Plan:
     candidates: int = 301
     population: int = 10
     search_seed: int = 1
+    cost: Cost = USUAL
 
     @property
     def trials(self) -> int:
@@ -157,17 +144,6 @@ class Found:
     candidates: int
 
 
-def run_cost(figures: Figures) -> float:
-    """Return the cost of one run; COST_FAILED at most, also where a figure is missing or NaN.
-
-    A run of a deck with conditions brings its own, normalised by its task.
-    """
-    if "cost" in figures:
-        return min(figures["cost"], COST_FAILED)
-    cost = sum(weight * figures.get(name, math.nan) for name, weight in COST_WEIGHTS.items())
-    return min(cost, COST_FAILED) if math.isfinite(cost) else COST_FAILED
-
-
 def candidate_costs(
     outer: str, candidates: Sequence[Gains], evaluate: Evaluate, plan: Plan
 ) -> list[float]:
@@ -178,7 +154,7 @@ def candidate_costs(
         for case in plan.cases
         for seed in plan.seeds
     ]
-    costs = [run_cost(figures) for figures in evaluate(trials)]
+    costs = [plan.cost.of(figures) for figures in evaluate(trials)]
     each = len(plan.cases) * len(plan.seeds)
     return [sum(costs[i : i + each]) / each for i in range(0, len(costs), each)]
 
@@ -300,7 +276,7 @@ def with_origin(
         "seeds": ", ".join(map(str, plan.seeds)),
         "population": plan.population,
         "search_seed": plan.search_seed,
-        "cost": " + ".join(f"{weight:g} {name}" for name, weight in COST_WEIGHTS.items()),
+        "cost": plan.cost.told(),
     }
     for outer, result in found.items():
         gains = with_values(gains, outer, result.values)

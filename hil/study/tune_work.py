@@ -23,14 +23,13 @@ from hil.config.load import build, builtin_names, load_robot, load_scenario
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
 from hil.core.files import read_toml
-from hil.core.registries import OUTER_LAWS, source_digests
+from hil.core.registries import OUTER_LAWS, TUNING_COSTS, source_digests
+from hil.study.costs import COST_WEIGHTS, Figures
 from hil.study.suite import refuse_seen, spread_over
 from hil.study.tune import (
     CASES,
-    COST_WEIGHTS,
     SEARCH,
     Case,
-    Figures,
     Plan,
     Trial,
     Variant,
@@ -39,7 +38,7 @@ from hil.study.tune import (
 from hil.study.tuning_verdict import ALL_SCENARIOS, HELD_OUT_SCENARIOS, JUDGED
 
 _FORMAT = "hil-tune-1"
-_KEPT = frozenset((*COST_WEIGHTS, *JUDGED))
+_KEPT = frozenset((*COST_WEIGHTS, *JUDGED))  # enough for the usual cost
 # Cells of a deck that each candidate runs, spread over its tasks and conditions.
 SEARCHED_CELLS = 8
 _VARIANTS: tuple[Variant, ...] = ("calm", "pushed", "late", "beside")
@@ -173,8 +172,11 @@ def _is_deck(name: str) -> bool:
 class Journal:
     """The runs of a search on disk, by what they were runs of."""
 
-    def __init__(self, path: Path, identity: Mapping[str, Any]) -> None:
+    def __init__(
+        self, path: Path, identity: Mapping[str, Any], *, every_figure: bool = False
+    ) -> None:
         self.path = path
+        self._every_figure = every_figure
         self.notes: list[str] = []
         self._known: dict[str, Figures] = {}
         fresh = not self._take_up(dict(identity))
@@ -239,7 +241,9 @@ class Journal:
 
         def made(place: int, figures: Figures) -> None:
             key = keys[missing[place]]
-            self._known[key] = {name: figures[name] for name in figures if name in _KEPT}
+            self._known[key] = {
+                name: figures[name] for name in figures if self._every_figure or name in _KEPT
+            }
             self._write({"run": key, "figures": self._known[key]})
             done()
 
@@ -264,10 +268,10 @@ def identity_of(
     """Return what decides the runs of a search; a larger budget is the same search gone on with."""
     searched: dict[str, Any] = {
         "boxes": boxes_of(laws),
-        "cost": COST_WEIGHTS,
+        "cost": COST_WEIGHTS if plan.cost.is_usual else plan.cost.name,
         "cases": [str(c) for c in plan.cases],
     }
-    texts = source_digests(laws)
+    texts = source_digests(laws) | source_digests([plan.cost.name], TUNING_COSTS)
     searched |= {"texts": texts} if texts else {}
     return {
         "camera": camera,

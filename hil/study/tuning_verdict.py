@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from hil.analysis.stats import Paired, paired
 from hil.core.errors import BadInput
-from hil.study.tune import Case, Figures, Plan, Trial, run_cost
+from hil.study.costs import USUAL as USUAL_COST
+from hil.study.costs import Cost, Figures
+from hil.study.tune import Case, Plan, Trial
 
 if TYPE_CHECKING:
     from hil.config.gains import Gains
@@ -39,7 +41,7 @@ USUAL: Pair = ("asg-ism", "pid")
 class Verdict:
     """One law minus another on held-out seeds: by scenario (and over all of them), by figure.
 
-    `failed` counts each law's runs without figures; their pairs cost COST_FAILED and are left out
+    `failed` counts each law's runs without figures; their pairs cost what a failed run does and are left out
     of the other figures.
     """
 
@@ -106,10 +108,12 @@ def judge(
     figures: Sequence[Figures],
     pair: Pair = USUAL,
     seeds_seen: Sequence[int] = Plan().seeds,
+    cost: Cost = USUAL_COST,
 ) -> Verdict:
     """Return the verdict on the runs of a held-out tape; runs of other laws are left aside.
 
-    Raises BadInput where a run is one that the search has made (`seeds_seen`).
+    `cost` is the one that the search has minimised. Raises BadInput where a run is one that the search
+    has made (`seeds_seen`).
     """
     law, other = pair
     _refuse_tuned_on(trials, seeds_seen)
@@ -129,7 +133,7 @@ def judge(
         for scenario in values
     }
     for trial, found in zip(trials, figures, strict=True):
-        known = {**found, "cost": run_cost(found)}
+        known = {**found, "cost": cost.of(found)}
         for scenario in (ALL_SCENARIOS, trial.case.scenario):
             for name in JUDGED:
                 values[scenario][name][trial.outer].append(known.get(name, math.nan))

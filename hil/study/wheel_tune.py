@@ -12,7 +12,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from hil.core.registry import Box
-from hil.study.tune import COST_FAILED, Found, minimise
+from hil.study.costs import COST_FAILED
+from hil.study.tune import Found, minimise
 from hil.study.wheel_bench import CASES, DEFAULT, Case, figures, run
 
 # Least, start and largest value; from the start both laws can turn the robot on the spot.

@@ -11,9 +11,17 @@ from hil.board.wheel_laws import SUMMARIES
 from hil.config.fields import Setting, settings
 from hil.config.load import builtin_names
 from hil.core.errors import BadInput
-from hil.core.figures import BY_NAME
+from hil.core.figures import declared
 from hil.core.files import parse_toml
-from hil.core.registries import BY_PLURAL, ESTIMATORS, LOCALISERS, OUTER_LAWS, REFERENCES, VEHICLES
+from hil.core.registries import (
+    BY_PLURAL,
+    ESTIMATORS,
+    FIGURES,
+    LOCALISERS,
+    OUTER_LAWS,
+    REFERENCES,
+    VEHICLES,
+)
 from hil.core.registry import BUILT_IN, Entry, Registry
 
 # Where a scenario has the settings of a thing of a kind.
@@ -37,10 +45,13 @@ class Item:
     search: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     trace: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     unit: str = ""
+    better: str = ""  # which way, of a figure
     set_by: str = ""
 
     def lines(self) -> Iterator[str]:
-        """Yield a line for each setting, and for each term of its trace."""
+        """Yield a line for each setting, and for each term of its trace; a figure's unit."""
+        if self.better:
+            yield f"unit {self.unit or 'none'}, better: {self.better}"
         if self.settings:
             yield f"--set {self.set_by}KEY=VALUE, with KEY"
         for item in self.settings:
@@ -62,6 +73,7 @@ class Item:
             "summary": self.summary,
             "origin": self.origin,
             "unit": self.unit,
+            "better": self.better,
             "set_by": self.set_by,
             "settings": [
                 {
@@ -105,8 +117,6 @@ def listing(kind: str, from_files: Sequence[str] = ()) -> Listing:
         raise BadInput(f"{from_files[0]}: {kind} do not come from Python files")
     if kind == "wheel-laws":
         items = [Item(name, f"{said}, on the board") for name, said in SUMMARIES.items()]
-    elif kind == "figures":
-        items = [Item(m.name, m.definition, unit=m.unit) for m in BY_NAME.values()]
     else:
         items = [Item(name, _first_words(kind, name)) for name in builtin_names(kind)]
     return Listing(kind, tuple(items))
@@ -132,9 +142,11 @@ def _item(entry: Entry, registry: Registry) -> Item:
     if registry in (REFERENCES, VEHICLES):
         keys = tuple(key for key in keys if key.key != "kind")
     set_by = _SET_BY.get(registry.kind, "").format(entry.key)
+    metric = declared(entry) if registry is FIGURES else None
     return Item(
-        entry.name, entry.summary, entry.origin, keys, entry.search, entry.trace, set_by=set_by
-    )
+        entry.name, entry.summary, entry.origin, keys, entry.search, entry.trace,
+        unit=metric.unit if metric else "", better=metric.better if metric else "", set_by=set_by,
+    )  # fmt: skip
 
 
 def _first_words(kind: str, name: str) -> str:

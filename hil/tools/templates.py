@@ -10,17 +10,22 @@ from pathlib import Path
 
 from hil.config.load import builtin_names
 from hil.core.errors import BadInput
-from hil.core.registries import ESTIMATORS, LOCALISERS, OUTER_LAWS
+from hil.core.registries import ESTIMATORS, FIGURES, LOCALISERS, OUTER_LAWS, TUNING_COSTS
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,39}")
-_REGISTRIES = {"law": OUTER_LAWS, "localiser": LOCALISERS, "estimator": ESTIMATORS}
+_REGISTRIES = {
+    "law": OUTER_LAWS, "localiser": LOCALISERS, "estimator": ESTIMATORS,
+    "figure": FIGURES, "cost": TUNING_COSTS,
+}  # fmt: skip
 _IN_PYTHON = (*_REGISTRIES, "plant")
 _ROBOT = "thesis-4wd"
-# What to try first; {0} is the file.
+# What to try first; {0} is the file, {1} its name alone.
 _TRY = {
     "law": "hil run scenario-1 --outer ./{0}",
     "estimator": "hil run scenario-1 --set control.estimator=./{0}",
     "localiser": "hil run scenario-1 --set camera.localiser=./{0}",
+    "figure": "hil run scenario-1 --figure ./{0}",
+    "cost": "hil tune --cost ./{0} --candidates 11 --held-out 2 --out {1}-tuned.toml",
     "plant": "hil run scenario-1 --set robot.plant=./{0}",
     "scenario": "hil run ./{0}",
     "robot": "hil check robot {0}",
@@ -54,7 +59,7 @@ def write_template(
         ) from None
     except OSError as error:
         raise BadInput(f"{path}: cannot be written: {error.strerror}") from None
-    return path, _TRY[kind].format(path.name)
+    return path, _TRY[kind].format(path.name, path.stem)
 
 
 def _text(folder: str, name: str) -> str:

@@ -12,8 +12,8 @@ from gymnasium.vector import SyncVectorEnv
 
 import hil
 from hil.record.schema import SAMPLE_NAMES
+from hil.study.costs import COST_FAILED, USUAL
 from hil.study.gym_env import OBSERVATION, HilEnv
-from hil.study.tune import COST_FAILED, run_cost
 
 LAW = '''
 """Sends commands that were written down."""
@@ -103,7 +103,7 @@ def test_rewards_add_up_to_minus_the_cost_of_tuning() -> None:
         _, reward, terminated, done, info = made.step(np.zeros(2))
         assert not terminated
         rewards.append(reward)
-    cost = run_cost(info["figures"])
+    cost = USUAL.of(info["figures"])
     assert 0.0 < cost < COST_FAILED
     assert sum(rewards) == pytest.approx(-cost, abs=1e-9)
     # At rest |delta1| is constant e: each tick costs e / 30, from the second on.

@@ -9,10 +9,9 @@ import pytest
 from hil.config.control import ControlConfig
 from hil.config.gains import Gains
 from hil.config.load import load_scenario
+from hil.study.costs import COST_FAILED, COST_WEIGHTS, USUAL
 from hil.study.tune import (
     CASES,
-    COST_FAILED,
-    COST_WEIGHTS,
     PUSHES,
     SEARCH,
     Case,
@@ -20,7 +19,6 @@ from hil.study.tune import (
     case_scenario,
     decode,
     near_bounds,
-    run_cost,
     tune,
     with_values,
     write_gain_set,
@@ -102,10 +100,10 @@ def test_a_run_without_figures_costs_most():
         "eta1_variation_m_s": 0.6,
         "theta_dot_variation_rad_s": 7.0,
     }
-    assert run_cost(calm) == pytest.approx(1.5 + 0.4 + 0.05 + 0.12 + 0.14)
-    assert run_cost({}) == COST_FAILED
-    assert run_cost({**calm, "settling_20mm_s": math.nan}) == COST_FAILED
-    assert run_cost({**calm, "iae_m_s": 1e6}) == COST_FAILED
+    assert USUAL.of(calm) == pytest.approx(1.5 + 0.4 + 0.05 + 0.12 + 0.14)
+    assert USUAL.of({}) == COST_FAILED
+    assert USUAL.of({**calm, "settling_20mm_s": math.nan}) == COST_FAILED
+    assert USUAL.of({**calm, "iae_m_s": 1e6}) == COST_FAILED
 
 
 def test_written_gains_are_the_ones_evaluated(tuned, tmp_path):

@@ -7,6 +7,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -35,15 +36,18 @@ def shorter(words: list[str]) -> list[str]:
     return [*words, "--set", f"duration_s={2 if words[0] == 'run' else 0.5}"] if slow else words
 
 
-def walk(page: str) -> list[tuple[str, Done]]:
-    """Write the files and run the commands of a page in the current folder, in its order."""
+def walk(page: str, as_run: Callable[[list[str]], list[str]] = shorter) -> list[tuple[str, Done]]:
+    """Write the files and run the commands of a page in the current folder, in its order.
+
+    `as_run` is given the words of a command and gives those that are run.
+    """
     done = []
     for language, file, text in blocks(page):
         if language == "console":
             for line in text.splitlines():
                 program, *words = shlex.split(line)
                 assert program == "hil"
-                done.append((line, hil(*shorter(words))))
+                done.append((line, hil(*as_run(words))))
         else:
             assert file, f"{page}: a block of {language} without a file"
             Path(file).write_text(text, encoding="utf-8")

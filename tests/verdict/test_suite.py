@@ -9,6 +9,7 @@ from hil.config.deck import Cell, Deck, load_deck
 from hil.config.load import load_scenario
 from hil.control.references import make_reference, unfinished
 from hil.core.errors import BadInput
+from hil.study.costs import USUAL
 from hil.study.experiment import Conditions, deck_specs
 from hil.study.suite import (
     FAILED,
@@ -21,7 +22,7 @@ from hil.study.suite import (
     spread_over,
     together,
 )
-from hil.study.tune import Case, Trial, run_cost
+from hil.study.tune import Case, Trial
 from hil.study.tune_work import load_tasks
 from hil.study.tuning_verdict import judge
 
@@ -208,7 +209,7 @@ def test_tune_counts_runs_of_the_suite_by_their_task():
     yard = Yardstick.of({name: figures_of(usual, 0.02) for name, usual in size.items()})
     for name in size:
         trial = Trial("pid", None, Case(f"{name}-in-slope", "calm", "pid"), 1)
-        assert run_cost(ByTask(work, yard)(trial)) == pytest.approx(2.5)
+        assert USUAL.of(ByTask(work, yard)(trial)) == pytest.approx(2.5)
     with pytest.raises(BadInput, match="ends early in it"):
         Yardstick.of({"small": {}})
 

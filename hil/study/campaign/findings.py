@@ -17,7 +17,6 @@ import numpy as np
 
 from hil.analysis.intervals import Interval
 from hil.analysis.stats import Paired, Tape, level, paired
-from hil.core.figures import BY_NAME
 from hil.report.arms import Arm, arm_names, law_rank
 from hil.study.campaign.plan import HOLDS, Campaign, metric_of
 
@@ -102,7 +101,10 @@ def outcomes_of(campaign: Campaign, table: pa.Table) -> Outcomes:
         tuple(arms[i] for i in order),
         tuple(names[arms[i]] for i in order),
         {axis: by_pair(axis)[:, 0] for axis in campaign.axes},
-        {name: by_pair(name).astype(np.float64)[:, order] for name in (*BY_NAME, HOLDS.name)},
+        {
+            name: by_pair(name).astype(np.float64)[:, order]
+            for name in (*campaign.figures, HOLDS.name)
+        },
         (by_pair("outcome") == "complete")[:, order],
         tuple(zip(by_pair("seed")[:, 0].tolist(), by_pair("draw")[:, 0].tolist(), strict=True)),
     )

@@ -21,9 +21,10 @@ from hil.config.gains import only_gains_of
 from hil.config.limits import check_board
 from hil.config.load import build, load_scenario, put_value, read_tree
 from hil.config.scenario import Scenario
+from hil.core import figures
 from hil.core.errors import BadInput
-from hil.core.figures import BY_NAME, Metric, require_known
-from hil.core.registries import Sources, adopt_sources, file_sources, source_digests
+from hil.core.figures import BY_NAME, Metric
+from hil.core.registries import FIGURES, Sources, adopt_sources, file_sources, source_digests
 from hil.study.campaign.axes import Axis, Distribution, Range, spread_evenly
 
 Point = dict[str, Any]
@@ -54,7 +55,17 @@ HOLDS = Metric(
 
 def metric_of(figure: str) -> Metric:
     """Return a figure that a campaign can draw; raises BadInput with near names when unknown."""
-    return HOLDS if figure == HOLDS.name else BY_NAME[require_known(figure)]
+    return HOLDS if figure == HOLDS.name else figures.metric_of(figure)
+
+
+def _drawn(figure: str) -> str:
+    try:
+        return metric_of(figure).name
+    except BadInput as error:
+        raise ValueError(str(error)) from None
+
+
+DrawnFigure = Annotated[str, AfterValidator(_drawn)]
 
 
 class CampaignFile(Section):
@@ -83,9 +94,10 @@ class CampaignFile(Section):
     random: dict[str, Distribution] = Field(
         default_factory=dict, description="values drawn by dotted key"
     )
-    figures: tuple[str, ...] = Field(
-        ("ise_m2_s", "pwm_variation_counts"), min_length=1, description="figures drawn, or holds"
-    )
+    figures: tuple[DrawnFigure, ...] = Field(
+        ("ise_m2_s", "pwm_variation_counts"), min_length=1,
+        description="figures drawn: names, FILE.py[:NAME], or holds",
+    )  # fmt: skip
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
@@ -163,7 +175,9 @@ class Campaign:
         """Return what two campaigns share exactly when their runs are the same."""
         base = only_gains_of(self.base, self.file.outer)
         tree = {"file": self.file.model_dump(mode="json"), "base": base}
-        tree |= {"texts": texts} if (texts := source_digests(self.file.outer)) else {}
+        own = [name for name in self.figures if name not in BY_NAME]
+        texts = source_digests(self.file.outer) | source_digests(own, FIGURES)
+        tree |= {"texts": texts} if texts else {}
         return hashlib.sha256(json.dumps(tree, sort_keys=True).encode()).hexdigest()
 
     @property
@@ -171,6 +185,12 @@ class Campaign:
         """Return the dotted names of everything that is varied."""
         tied = itertools.chain(*self.file.together)
         return (*self.file.grid, *tied, *self.file.random)
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        """Return the names of the figures that every run gives, the built-in ones first."""
+        required = [item["metric"] for item in self.base["requirements"]]
+        return tuple(dict.fromkeys((*BY_NAME, *self.base["figures"], *required)))
 
     def grid_points(self) -> list[Point]:
         """Return every combination of grid and lists."""
@@ -234,12 +254,13 @@ def load_campaign(name_or_path: str) -> Campaign:
             tree[table] = _flat(tree[table])
     tree.setdefault("name", path.stem)
     file = _checked(tree, path)
-    for figure in file.figures:
-        metric_of(figure)
     name = file.scenario
     if name.endswith(".toml") and not Path(name).is_absolute():
         name = str(path.parent / name)
-    base = load_scenario(name, file.set).model_dump(mode="json")
+    scenario = load_scenario(name, file.set)
+    own = (name for name in file.figures if name != HOLDS.name and name not in BY_NAME)
+    asked = tuple(dict.fromkeys((*scenario.figures, *own)))
+    base = scenario.model_copy(update={"figures": asked}).model_dump(mode="json")
     campaign = Campaign(file, base)
     for axis, values in _all_values(campaign).items():
         for value in values:

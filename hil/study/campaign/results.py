@@ -22,7 +22,7 @@ import pyarrow.parquet as pq
 
 from hil import __version__
 from hil.core.errors import BadInput, RigFault
-from hil.core.figures import METRICS
+from hil.core.figures import BY_NAME
 from hil.core.files import PART, replace_file, replacing
 from hil.record.manifest import git_revision
 from hil.study.campaign.plan import Campaign, Job
@@ -54,7 +54,8 @@ def schema_of(campaign: Campaign) -> pa.Schema:
     fields += [("draw", pa.int64()), ("seed", pa.int64())]
     fields += [(name, pa.string()) for name in ("outer", "inner", "outcome", "detail")]
     fields += [("holds", pa.bool_()), ("t_end_s", pa.float64())]
-    fields += [(metric.name, pa.float64()) for metric in METRICS]
+    own = [name for name in campaign.figures if name not in BY_NAME]
+    fields += [(name, pa.float64()) for name in (*BY_NAME, *own)]
     fields += [("program", pa.string())]
     return pa.schema(fields, metadata={"campaign_sha256": campaign.digest})
 

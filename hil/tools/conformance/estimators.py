@@ -28,7 +28,7 @@ from hil.tools.conformance.laws import (
 )
 from hil.tools.conformance.report import Checks, Named, Report, Violation, entry_of
 from hil.tools.conformance.sensed_drive import Asked, Drive, Given, mirrored_drive, sensed_drive
-from hil.tools.conformance.watch import Heard, watch
+from hil.tools.conformance.watch import Heard, require_no_clock, require_no_random, watch
 
 # From here on the estimate must be near the truth: filters need a while.
 SETTLED_S = 2.0
@@ -95,7 +95,7 @@ def estimator_report(
         checks.run("no state shared", lambda: _shared(bench))
         heard = Heard()
         checks.run("no clock", lambda: _no_clock(bench, heard))
-        checks.run("no unseeded random number", lambda: _no_random(heard))
+        checks.run("no unseeded random number", lambda: require_no_random(heard))
         checks.run("mirror symmetry", lambda: _mirror(bench))
         checks.run("step time", lambda: _step_time(bench))
         runs: list[RunRecord] = []
@@ -238,15 +238,7 @@ def _shared(bench: Bench) -> str:
 def _no_clock(bench: Bench, heard: Heard) -> str:
     with watch(heard):
         feed(bench.make(), bench.drive)
-    if heard.clocks:
-        raise Violation(f"calls {', '.join(heard.clocks)}; times are arguments")
-    return "no call of a clock"
-
-
-def _no_random(heard: Heard) -> str:
-    if heard.random:
-        raise Violation(f"calls {', '.join(heard.random)}; draw from a generator with a fixed seed")
-    return "no call of a generator without a seed"
+    return require_no_clock(heard, "times are arguments")
 
 
 def _mirror(bench: Bench) -> str:

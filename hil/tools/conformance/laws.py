@@ -18,14 +18,15 @@ from hil.config.scenario import Scenario
 from hil.core.errors import RigFault
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import Entry
+from hil.core.time_limit import TooLongError, time_limit
 from hil.core.types import OuterCommand, OuterLaw
 from hil.record.reader import RunRecord
 from hil.record.schema import LAW_COLUMNS, own_columns
 from hil.runs.execute import RunSpec, execute_in_memory, make_law
-from hil.runs.law_guard import STEP_MAX_S, TooLongError, time_limit
+from hil.runs.law_guard import STEP_MAX_S
 from hil.tools.conformance.floor import Episode, episodes, mirrored
 from hil.tools.conformance.report import Checks, Named, Report, Violation, entry_of
-from hil.tools.conformance.watch import Heard, watch
+from hil.tools.conformance.watch import Heard, require_no_clock, require_no_random, watch
 
 SCENARIO = "scenario-1"
 # Part of the outer tick that a step may take: the rest is the camera's, the estimator's and the link's.
@@ -99,7 +100,7 @@ def _on_the_floor(checks: Checks, bench: Bench) -> None:
     heard = Heard()
     made = (
         _finite, _limits, _trace, _deterministic, _reset, _shared,
-        lambda bench: _no_clock(bench, heard), lambda _: _no_random(heard), _mirror,
+        lambda bench: _no_clock(bench, heard), lambda _: require_no_random(heard), _mirror,
     )  # fmt: skip
     for name, check in zip(ON_THE_FLOOR, made, strict=True):
         checks.run(name, partial(check, bench))
@@ -268,15 +269,7 @@ def _no_clock(bench: Bench, heard: Heard) -> str:
             law.reset(episode.references[0], episode.estimates[0])
             for reference, estimate in zip(episode.references, episode.estimates, strict=True):
                 law.step(reference, estimate, bench.dt_s)
-    if heard.clocks:
-        raise Violation(f"calls {', '.join(heard.clocks)}; time is the argument dt_s, and t_host_s")
-    return "no call of a clock"
-
-
-def _no_random(heard: Heard) -> str:
-    if heard.random:
-        raise Violation(f"calls {', '.join(heard.random)}; draw from a generator with a fixed seed")
-    return "no call of a generator without a seed"
+    return require_no_clock(heard, "time is the argument dt_s, and t_host_s")
 
 
 def _mirror(bench: Bench) -> str:

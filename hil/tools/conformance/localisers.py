@@ -18,7 +18,7 @@ from hil.core.types import Pose, PoseMeasurement, wrap_pi
 from hil.tools.conformance.floor import mirrored_pose
 from hil.tools.conformance.laws import SCENARIO
 from hil.tools.conformance.report import Checks, Named, Report, Violation, entry_of
-from hil.tools.conformance.watch import Heard, watch
+from hil.tools.conformance.watch import Heard, require_no_clock, require_no_random, watch
 from sim_twin.camera_sim import RenderedCamera
 from vision.localisers.making import make_localiser
 
@@ -77,7 +77,7 @@ def localiser_report(
         checks.run("picture left as it is", lambda: _untouched(bench))
         heard = Heard()
         checks.run("no clock", lambda: _no_clock(bench, heard))
-        checks.run("no unseeded random number", lambda: _no_random(heard))
+        checks.run("no unseeded random number", lambda: require_no_random(heard))
         checks.run("step time", lambda: _step_time(bench))
         return checks.report()
 
@@ -219,15 +219,7 @@ def _untouched(bench: Bench) -> str:
 def _no_clock(bench: Bench, heard: Heard) -> str:
     with watch(heard):
         _all(bench.make(), bench)
-    if heard.clocks:
-        raise Violation(f"calls {', '.join(heard.clocks)}; a picture says all there is to say")
-    return "no call of a clock"
-
-
-def _no_random(heard: Heard) -> str:
-    if heard.random:
-        raise Violation(f"calls {', '.join(heard.random)}; draw from a generator with a fixed seed")
-    return "no call of a generator without a seed"
+    return require_no_clock(heard, "a picture says all there is to say")
 
 
 def _step_time(bench: Bench) -> str:

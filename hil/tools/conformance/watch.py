@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from hil.tools.conformance.report import Violation
+
 _CLOCKS = frozenset(
     f"{name}{suffix}"
     for name in ("time", "monotonic", "perf_counter", "process_time", "thread_time", "clock_gettime")
@@ -77,6 +79,20 @@ def watch(heard: Heard) -> Iterator[None]:
         sys.setprofile(before)
         if _numpy_state() != state:
             heard._note(heard.random, "numpy.random (the global generator)")
+
+
+def require_no_clock(heard: Heard, instead: str) -> str:
+    """Return that no clock was heard; raises Violation, which says what there is `instead`."""
+    if heard.clocks:
+        raise Violation(f"calls {', '.join(heard.clocks)}; {instead}")
+    return "no call of a clock"
+
+
+def require_no_random(heard: Heard) -> str:
+    """Return that no unseeded random number was heard; raises Violation."""
+    if heard.random:
+        raise Violation(f"calls {', '.join(heard.random)}; draw from a generator with a fixed seed")
+    return "no call of a generator without a seed"
 
 
 def _numpy_state() -> tuple[bytes, int]:

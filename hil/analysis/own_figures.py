@@ -1,0 +1,76 @@
+"""Figures of merit from a file or a package: what they may not do is end the run that they judge.
+
+One that raises, takes too long or gives no finite number has no value in that run, and a note says so.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hil.core.errors import BadInput
+from hil.core.figures import Metric
+from hil.core.registries import FIGURES
+from hil.core.registry import Entry, in_one_line, place_of
+from hil.core.time_limit import TooLongError, time_limit
+
+if TYPE_CHECKING:
+    from hil.analysis.metrics import Columns, RunData
+
+# Longest that a figure may take, s: while a record is closed, Ctrl-C waits for it.
+TIME_MAX_S = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class OwnFigures:
+    """Values by name, and a line for each figure that has none in this run."""
+
+    values: Mapping[str, float]
+    notes: tuple[str, ...] = ()
+
+
+def compute_own(metrics: Sequence[Metric], run: RunData) -> OwnFigures:
+    """Return the values of figures by their declarations; what is not known here has none."""
+    values, notes = {}, []
+    for metric in metrics:
+        try:
+            values[metric.name] = value_of(FIGURES.get(metric.name), run)
+        except BadInput as error:
+            values[metric.name] = math.nan
+            notes.append(str(error))
+    return OwnFigures(values, tuple(notes))
+
+
+def value_of(entry: Entry, run: RunData) -> float:
+    """Return a figure of a run; raises BadInput that names file, line and what happened."""
+    try:
+        with time_limit(TIME_MAX_S), np.errstate(all="ignore"):
+            value = entry.factory(run)
+        number = math.nan if isinstance(value, str) else float(value)
+    except TooLongError as error:
+        raise _without(entry, f"took longer than {TIME_MAX_S:g} s", error) from None
+    except (Exception, SystemExit) as error:
+        raise _without(entry, f"raised {in_one_line(error)}", error) from None
+    if isinstance(value, str) or math.isinf(number):
+        raise _without(entry, f"gave {value!r:.60}, a finite number is needed")
+    if math.isnan(number):
+        raise _without(entry, "gave NaN")
+    return number
+
+
+def _without(entry: Entry, said: str, error: BaseException | None = None) -> BadInput:
+    return BadInput(
+        f"figure of merit {entry.name} ({place_of(entry, error)}): {said}: it has no value in this run"
+    )
+
+
+def read_only(columns: Columns) -> Columns:
+    """Return the columns as views that cannot be written to."""
+    found = {name: values.view() for name, values in columns.items()}
+    for values in found.values():
+        values.flags.writeable = False
+    return found

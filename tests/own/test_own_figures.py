@@ -1,0 +1,368 @@
+"""Figures of merit and tuning costs from files: where they appear, what they cannot do, how they are refused."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import hil as api
+from hil.config.load import load_scenario
+from hil.core.figures import BY_NAME, metric_of
+from hil.record.manifest import read_manifest
+from hil.record.reader import read_run
+from hil.study.costs import COST_FAILED, cost_of
+from hil.study.tune import Plan, candidate_costs
+from hil.tools.conformance import cost_report, figure_report
+from tests.cli.command import hil, run_pose
+from tests.own.starts import template, written
+from tests.own.test_docs import refused, shorter, walk
+
+NEAR = template("figure.py", "near")
+COST = template("cost.py", "own-cost")
+BRIEF = ("--set", "duration_s=1.0")
+
+
+def figure_text(name: str, body: str) -> str:
+    """Return a file with one figure of this body."""
+    return (
+        "import time, random\nimport numpy as np\nimport hil\n\n\n"
+        f'@hil.figure("{name}", unit="m", meaning="a test\'s")\n'
+        f"def given(run):\n    {body}\n"
+    )
+
+
+def test_page_on_own_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Every block of the page, in its order; runs at their full length, searches shortened."""
+    monkeypatch.chdir(tmp_path)
+    done = walk("own-figure.md", lambda words: shorter(words) if words[0] == "tune" else words)
+    assert [(line, end.status, end.err) for line, end in done if end.status != 0] == []
+    assert refused(done) == []
+    assert len(done) == 11
+    assert metric_of("stray_m").unit == "m"
+    assert "largest stray" in Path("both.html").read_text()
+    assert "largest stray" in dict(done)["hil compare run other --report both.html"].out
+    assert "stray_m" in pq.read_table("campaign/results.parquet").column_names
+    (gains,) = Path().glob("straight.toml")
+    assert 'cost = "straight (error over time and stray)"' in gains.read_text()
+
+
+def test_a_figure_stands_beside_the_built_in_ones_and_is_kept(tmp_path: Path):
+    """Value by hand from the columns; metrics.json, --json, CSV, and text and hash in the record."""
+    file = written(tmp_path / "near.py", NEAR)
+    out = tmp_path / "run"
+    done = run_pose("--figure", file, "--outer", "pid", "--json", "--out", out)
+    assert done.status == 0, done.err
+    table = pq.read_table(out / "samples.parquet").to_pydict()
+    error = np.hypot(table["true_delta1_x_m"], table["true_delta1_y_m"])
+    steps = zip(np.diff(table["t_s"]), error, strict=False)
+    by_hand = sum(dt_s for dt_s, far_m in steps if far_m <= 0.05)
+    kept = json.loads((out / "metrics.json").read_text())["figures"]["near"]
+    assert kept == {"value": pytest.approx(by_hand), "unit": "s"}
+    assert done.json["figures"]["near"] == kept
+    (plugin,) = read_manifest(out).plugins
+    assert plugin.sha256 == hashlib.sha256(NEAR.encode()).hexdigest()
+    assert (out / plugin.file).read_text() == NEAR
+    assert hil("compare", out, out, "--csv", tmp_path / "all.csv").status == 0
+    assert (tmp_path / "all.csv").read_text().splitlines()[0].endswith(",near")
+
+
+def test_samples_are_the_same_with_and_without(tmp_path: Path):
+    """A figure judges a run and changes nothing in it."""
+    file = written(tmp_path / "near.py", NEAR)
+    digests = []
+    for name, more in (("with", ("--figure", file)), ("without", ())):
+        run_pose(*BRIEF, *more, "--out", tmp_path / name)
+        digests.append(read_manifest(tmp_path / name).files["samples.parquet"].sha256)
+    assert digests[0] == digests[1]
+
+
+def test_a_requirement_on_it_decides_the_exit_status(tmp_path: Path):
+    """By file or by name; a scenario's file names it relative to itself."""
+    written(tmp_path / "near.py", NEAR)
+    for metric, least, status in (("./near.py", 5.0, 0), ("./near.py", 19.0, 1), ("near", 5.0, 0)):
+        figures = 'figures = ["./near.py"]\n' if metric == "near" else ""
+        text = (
+            f'base = "scenario-1"\nname = "held"\n{figures}[[requirements]]\nmetric = "{metric}"\n'
+        )
+        file = written(tmp_path / "held.toml", f"{text}min = {least}\n")
+        done = hil(
+            "run", file, "--camera", "pose", "--json", "--out", tmp_path / f"{metric[-2:]}{least}"
+        )
+        assert done.status == status, done.err
+        (told,) = done.json["requirements"]
+        assert told["holds"] is (status == 0)
+        assert told["text"] == f"{least:g} <= near s"
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("return 1.0 / 0", r"line 8\): raised ZeroDivisionError"),
+        ('return run.columns["nope"]', r"line 8\): raised KeyError: 'nope'"),
+        ("return float('nan')", r"\): gave NaN"),
+        ("return float('inf')", r"\): gave inf, a finite number is needed"),
+        ('return "3"', r"\): gave '3', a finite number is needed"),
+        ("return None", r"raised TypeError"),
+        ("return run.error_m", r"raised TypeError"),
+        ('run.columns["t_s"][0] = 7.0; return 1.0', r"line 8\): raised ValueError: .*read-only"),
+        ("raise SystemExit(5)", r"line 8\): raised SystemExit: 5"),
+    ],
+)
+def test_one_that_fails_leaves_the_record_whole(body: str, said: str, tmp_path: Path):
+    """It has no value in that run, one line says why, and a requirement on it does not hold."""
+    file = written(tmp_path / "failing.py", figure_text("failing_m", body))
+    out = tmp_path / "run"
+    bound = f'requirements=[{{metric="{file}", max=1.0}}]'
+    done = run_pose(*BRIEF, "--set", bound, "--out", out)
+    assert done.status == 1, done.err
+    assert done.err == ""
+    notes = [line for line in done.out.splitlines() if line.startswith("note: figure of merit")]
+    assert len(notes) == 1
+    assert re.search(said, notes[0]), notes
+    record = read_run(out)
+    assert (record.problems, record.manifest.outcome) == ((), "complete")
+    assert math.isnan(record.figures().values["failing_m"])
+    assert math.isfinite(record.figures().values["ise_m2_s"])
+    assert hil("replay", out).status == 0
+
+
+def test_one_that_takes_too_long_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The record is closed all the same: Ctrl-C waits for it meanwhile."""
+    monkeypatch.setattr("hil.analysis.own_figures.TIME_MAX_S", 0.05)
+    file = written(tmp_path / "endless.py", figure_text("endless_m", "while True: pass"))
+    done = run_pose(*BRIEF, "--figure", file, "--out", tmp_path / "run")
+    assert (
+        "note: figure of merit endless_m (endless.py, line 8): took longer than 0.05 s" in done.out
+    )
+    assert read_run(tmp_path / "run").problems == ()
+
+
+def test_records_are_judged_afterwards_and_read_without_the_file(tmp_path: Path):
+    """`compare --figure` computes from old records; a recorded value needs no code of anyone's."""
+    file = written(tmp_path / "near.py", NEAR)
+    for law in ("pid", "asg-ism"):
+        run_pose("--outer", law, "--out", tmp_path / law)
+    done = hil("compare", tmp_path / "pid", tmp_path / "asg-ism", "--figure", file, "--json")
+    values = [run["figures"]["near"]["value"] for run in done.json["runs"]]
+    assert all(15.0 < value < 20.0 for value in values)
+    run_pose("--outer", "pid", "--figure", file, "--out", tmp_path / "third")
+    file.unlink()
+    again = hil("compare", tmp_path / "third", tmp_path / "asg-ism", "--json").json["runs"]
+    assert again[0]["figures"]["near"]["value"] == values[0]
+    assert "near" not in again[1]["figures"]
+    assert "near" in hil("compare", tmp_path / "third", tmp_path / "asg-ism").out
+    # Whoever judges by another text is no obstacle to an exact replay.
+    assert "bit for bit" in hil("replay", tmp_path / "third").out
+
+
+def test_repeats_and_campaigns_have_it(tmp_path: Path):
+    """Paired differences of an experiment, a column and a drawing of a campaign; workers know the file."""
+    file = written(tmp_path / "near.py", NEAR)
+    deck = written(tmp_path / "deck.toml", 'scenarios = ["scenario-1"]\n')
+    done = hil(
+        "experiment", deck, "--camera", "pose", "--repeats", 2, "--figure", file, "--json",
+        "--out", tmp_path / "exp",
+    )  # fmt: skip
+    assert done.status == 0, done.err
+    (comparison,) = done.json["comparisons"]
+    contrasts = comparison["repeats"]["contrasts"]
+    assert contrasts[0]["figures"]["near"]["pairs"] == 2
+    text = (
+        'scenario = "scenario-1"\nfigures = ["./near.py"]\n[grid]\n"robot.mass_kg" = [3.0, 3.4]\n'
+    )
+    campaign = written(tmp_path / "c.toml", text)
+    assert hil("sweep", campaign, "--workers", 2, "--out", tmp_path / "sweep").status == 0
+    rows = pq.read_table(tmp_path / "sweep" / "results.parquet").to_pylist()
+    assert len(rows) == 4
+    assert all(row["near"] > 10.0 for row in rows)
+    assert "time within 50 mm" in (tmp_path / "sweep" / "report.html").read_text()
+    file.write_text(NEAR + "# another\n")
+    assert "another campaign" in hil("sweep", campaign, "--out", tmp_path / "sweep").refusal
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x = 1\n", "registers no figure of merit"),
+        ("def broken(:\n", "line 1: SyntaxError"),
+        ("raise OSError('no disk')\n", "line 1: OSError: no disk"),
+        (NEAR.replace('"near"', '"ise_m2_s"'), "two have this name"),
+        (NEAR.replace('"near"', '"a b"'), "figure 'a b': a name begins with a letter"),
+        (NEAR.replace('"near"', '"a-b"'), "write _ in place of -"),
+        (NEAR.replace('unit="s"', "unit=3"), "unit = 3: needs a text of one line"),
+        (NEAR.replace("smaller_is_better=False", 'smaller_is_better="no"'), "True, False, or None"),
+    ],
+)
+def test_files_that_are_no_figure_are_refused(text: str, said: str, tmp_path: Path):
+    """One line, status 2, and nothing written."""
+    file = written(tmp_path / "wrong.py", text)
+    out = tmp_path / "run"
+    assert said in run_pose("--figure", file, "--out", out).refusal
+    assert not out.exists()
+
+
+def test_unknown_names_list_near_ones():
+    """What was looked for, where, and what is near."""
+    assert "no such figure" in run_pose("--figure", "ise").refusal
+    assert "near: ise_m2_s" in run_pose("--figure", "ise").refusal
+    refusal = hil("tune", "--cost", "usul", "--out", "never.toml").refusal
+    assert "tuning cost 'usul'" in refusal
+    assert "near: usual" in refusal
+
+
+def test_two_figures_of_one_name_are_both_named(tmp_path: Path):
+    """A second file with a figure of the same name is refused, with both files."""
+    one, two = (written(tmp_path / f"{name}.py", NEAR) for name in ("one", "two"))
+    refusal = run_pose("--figure", one, "--figure", two, "--out", tmp_path / "run").refusal
+    assert str(one) in refusal
+    assert str(two) in refusal
+
+
+def test_one_file_may_hold_a_law_a_figure_and_a_cost(tmp_path: Path):
+    """Each is known with the file as its origin, whichever of them loads it first."""
+    file = written(
+        tmp_path / "lab.py", template("law.py", "lab-law") + "\n\n" + NEAR + "\n\n" + COST
+    )
+    out = tmp_path / "run"
+    done = run_pose(*BRIEF, "--outer", file, "--figure", file, "--out", out)
+    assert done.status == 1, done.err
+    assert {(p.kind, p.name) for p in read_manifest(out).plugins} == {
+        ("outer law", "lab-law"),
+        ("figure of merit", "near"),
+    }
+    assert cost_of(f"{file}:own-cost").name == "own-cost"
+
+
+@pytest.mark.parametrize(
+    ("body", "fails"),
+    [
+        ("return 3.0", "negative control"),
+        ("return random.random()", "no unseeded random number"),
+        ("return float(run.error_m[-1]) + 0.0 * time.time()", "no clock"),
+        ("run.figures['ise_m2_s'] = 0.0; return float(run.error_m[-1])", "leaves the run as it is"),
+        ("return float(run.error_m[5])", "short run"),
+        ("return float(run.columns['s_x_m_s2'].max())", "finite"),
+    ],
+)
+def test_the_kit_finds_what_is_wrong_with_a_figure(body: str, fails: str, tmp_path: Path):
+    """Negative controls of the kit itself: each rule broken is named."""
+    file = written(tmp_path / "checked.py", figure_text("checked_m", body))
+    assert fails in figure_report(file).failures
+
+
+@pytest.mark.parametrize(
+    ("body", "fails"),
+    [
+        ("return -figures['iae_m_s']", "negative control"),
+        ("return 1e3 * figures['iae_m_s']", "below the cost of a failed run"),
+        ("import random; return figures['iae_m_s'] + random.random()", "no unseeded random number"),
+        ("return figures['no_such_m']", "finite"),
+        ("return 1.0 if figures['iae_m_s'] != figures['iae_m_s'] else 0.5", "without figures"),
+    ],
+)
+def test_the_kit_finds_what_is_wrong_with_a_cost(body: str, fails: str, tmp_path: Path):
+    """Negative controls of the kit itself: each rule broken is named."""
+    text = f'import hil\n\n\n@hil.tuning_cost("bad", meaning="x", failed=9.0)\ndef bad(figures):\n    {body}\n'
+    assert fails in cost_report(written(tmp_path / "bad.py", text)).failures
+
+
+def test_what_new_writes_passes_the_kit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The starting points keep every rule as they are written, and are never written over."""
+    monkeypatch.chdir(tmp_path)
+    for kind in ("figure", "cost"):
+        assert hil("new", kind, f"fresh_{kind}").status == 0
+        assert hil("check", kind, f"fresh_{kind}.py").status == 0
+        assert "is there already" in hil("new", kind, f"fresh_{kind}").refusal
+    assert "taken" in hil("new", "figure", "ise_m2_s").refusal
+    assert "taken" in hil("new", "cost", "usual").refusal
+
+
+def test_a_cost_decides_what_is_found(tmp_path: Path):
+    """Two candidates are ranked by it: the other way round by its negative, failed ones last by both."""
+    text = 'import hil\n\n\n@hil.tuning_cost("{0}", meaning="x", failed=9.0)\ndef c(figures):\n    return {1}\n'
+    costs = [
+        cost_of(str(written(tmp_path / f"{name}.py", text.format(name, body))))
+        for name, body in (("up", "figures['iae_m_s']"), ("down", "5.0 - figures['iae_m_s']"))
+    ]
+    gains = load_scenario("scenario-1").control.active_gains
+    given = [{"iae_m_s": 1.0}, {"iae_m_s": 2.0}, {}, {"iae_m_s": math.nan}]
+    ranks = []
+    for cost in costs:
+        plan = Plan(cases=Plan().cases[:1], seeds=(1,), cost=cost)
+        found = candidate_costs("pid", [gains] * 4, lambda _trials: given, plan)
+        assert found[2:] == [9.0, 9.0]
+        ranks.append(found[0] < found[1])
+    assert ranks == [True, False]
+
+
+def test_a_search_belongs_to_its_cost(tmp_path: Path):
+    """Origin and verdict tell it; a search left behind by one cost is not gone on with by another."""
+    cost = written(tmp_path / "own.py", COST)
+    out = tmp_path / "found.toml"
+    words = ("tune", "scenario-1", "--outer", "pid", "--candidates", 11, "--held-out", 2, *BRIEF)
+    done = hil(*words, "--cost", cost, "--out", out, "--json")
+    assert done.status == 0, done.err
+    assert done.json["gains"]["origin"]["cost"].startswith("own-cost (")
+    assert not out.with_name("found.toml.search").exists()
+    raising = written(
+        tmp_path / "raising.py", COST.replace('figures["iae_m_s"]', 'figures["stray_m"]')
+    )
+    other = tmp_path / "other.toml"
+    refusal = hil(*words, "--cost", raising, "--out", other).err.splitlines()[-1]
+    assert "tuning cost own-cost (raising.py, line 21): raised KeyError: 'stray_m'" in refusal
+    assert not other.exists()
+    again = hil(*words, "--out", other)
+    assert "is what another search left (its procedure differs" in again.err.splitlines()[-1]
+
+
+@pytest.mark.parametrize("failed", ["math.inf", "None", "'much'", "True"])
+def test_a_cost_must_say_what_a_failed_run_costs(failed: str, tmp_path: Path):
+    """A finite number: a search could not rank by another."""
+    text = COST.replace("failed=50.0", f"failed={failed}").replace(
+        "import hil", "import math\nimport hil"
+    )
+    assert (
+        "needs a finite number" in hil("tune", "--cost", written(tmp_path / "c.py", text)).refusal
+    )
+
+
+def test_an_environment_rewards_by_a_cost_of_ones_own(tmp_path: Path):
+    """The rewards of an episode add up to minus the cost of its run, all of it with the last step."""
+    pytest.importorskip("gymnasium")
+    cost = written(tmp_path / "own.py", COST)
+    env = api.make_env("scenario-1", camera="pose", cost=str(cost), duration_s=0.5)
+    env.reset()
+    rewards, done = [], False
+    while not done:
+        _, reward, failed, cut, info = env.step(env.action_space.low * 0.0)
+        rewards.append(reward)
+        done = failed or cut
+    env.close()
+    assert rewards[:-1] == [0.0] * (len(rewards) - 1)
+    assert -rewards[-1] == cost_of(str(cost)).of(info["figures"])
+    assert -rewards[-1] < 50.0
+
+
+def test_a_figure_of_this_process_needs_no_file():
+    """Decorated in a notebook, it is named like any other; built-in names are refused."""
+
+    @api.figure("of_a_notebook_m", unit="m", meaning="the last error", label="last")
+    def last(run: api.RunData) -> float:
+        return float(run.error_m[-1])
+
+    run = api.run(
+        "scenario-1", camera="pose", in_memory=True, duration_s=0.5, figures=["of_a_notebook_m"]
+    )
+    assert run.figures["of_a_notebook_m"] == run.figures["delta1_final_m"]
+    assert list(run.figures)[: len(BY_NAME)] == list(BY_NAME)
+    api.check_figure(last)
+    with pytest.raises(api.BadInput, match="two have this name"):
+        api.figure("ise_m2_s", unit="m", meaning="x")(last)
+    assert cost_of("usual").of({}) == COST_FAILED
