@@ -44,6 +44,11 @@ class Order(BaseModel):
         """Say whether time is simulated, so that a run may be watched at its own speed."""
         return is_simulated(self.target)
 
+    @property
+    def armed_by_hand(self) -> bool:
+        """Say whether the run waits, its robot found and shown, until the operator arms it."""
+        return not self.simulated and not self.target.startswith(REPLAY)
+
     def command(self) -> str:
         """Return the command line of the same run."""
         words = ["hil", "run", self.scenario]

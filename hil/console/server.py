@@ -18,7 +18,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from hil.console import campaigns, records, setup
+from hil.console import campaigns, records, setup, tuning
 from hil.console.access import HEADERS, PAGE_POLICY, Gate
 from hil.console.choices import choices, describe, is_built_in
 from hil.console.folders import Folders
@@ -208,6 +208,12 @@ async def _take(console: Console, page: Page, text: str) -> None:
             console.live.beat()
         elif do == "arm":
             console.live.arm(bool(message["wanted"]))
+        elif do == "tune":
+            console.live.tuning.change(str(message["key"]), float(message["value"]))
+        elif do == "step":
+            console.live.tuning.step(float(message["x_m"]), float(message["y_m"]))
+        elif do == "undo":
+            console.live.tuning.undo()
         elif do == "release":
             console.people.let_go(page)
         elif do == "start":
@@ -264,4 +270,4 @@ def application(
 
 
 _LOOKED_AT = records.LOOKED_AT | setup.LOOKED_AT | campaigns.LOOKED_AT
-_CHANGED = records.CHANGED | setup.CHANGED | campaigns.CHANGED
+_CHANGED = records.CHANGED | setup.CHANGED | campaigns.CHANGED | tuning.CHANGED

@@ -2,8 +2,8 @@
 
 A session learns of the world in five ways: what the host clock shows, which bytes have arrived,
 that a frame has arrived, that something broke, and what an operator orders. The tape holds just that,
-clock readings as float64, bytes as they came (good or damaged), an order as JSON. With frames.parquet, or camera.mkv, beside it a
-replay is exact on any target, also where the clock is the wall's (docs/replay.md).
+clock readings as float64, bytes as they came (good or damaged), an order as JSON. With frames.parquet,
+or camera.mkv, beside it a replay is exact on any target, also where the clock is the wall's (docs/replay.md).
 
 One line of JSON, then entries: a kind byte and its value. A torn last entry is left by the reader.
 """
@@ -163,6 +163,16 @@ class Tape:
 
     entries: tuple[Entry, ...]
     problem: str = ""
+
+    def orders(self) -> list[dict[str, Any]]:
+        """Return everything that an operator ordered, in order."""
+        return [order_in(value) for kind, value in self.entries if kind == ORDER]
+
+
+def order_in(value: float | bytes) -> dict[str, Any]:
+    """Return the order of an entry of this kind."""
+    found: dict[str, Any] = json.loads(value) if isinstance(value, bytes) else {}
+    return found
 
 
 def read_tape(path: Path) -> Tape:

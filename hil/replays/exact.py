@@ -26,7 +26,7 @@ from hil.record.tlog import LoggedFrame
 from hil.replays.divergence import Channel, compare_columns, compare_link
 from hil.rigs.replay import HAPPENED, open_replay
 from hil.runs.execute import RunSpec, board_parameters, make_ordered_parts, trace_terms
-from hil.runs.orders import Source
+from hil.runs.orders import OrderSource
 from hil.runs.parts import Ending
 from hil.runs.session import Session
 from hil.wire.identity import board_hashes
@@ -126,7 +126,7 @@ def replay(
     recorder = MemoryRecorder(source.manifest.model_copy(update={"trace": terms}), keep_link=True)
     rig = open_replay(source, recorded)
     # A shadow shows what the gains it was given would command: those ordered in the record are not its own.
-    orders = Source(rig.take_orders, rig.was_held)
+    orders = OrderSource(rig.take_orders, rig.was_held)
     parts = make_ordered_parts(spec, rig, recorder, orders, keep_gains=kind == "shadow")
     shadow = Shadow(parts.law, source.samples) if kind == "shadow" else None
     parts = replace(parts, law=shadow or parts.law)

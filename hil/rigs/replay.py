@@ -6,7 +6,6 @@ as the host code does. What the session sends goes nowhere; the link's tap keeps
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -49,8 +48,7 @@ class ReplayRig:
     ) -> None:
         self._entries: tuple[tuple[bytes, Any], ...] = recorded.entries
         self._at = 0
-        orders = [json.loads(value) for kind, value in self._entries if kind == tape.ORDER]
-        self.was_held = any(order.get("arm") is True for order in orders)
+        self.was_held = any(order.get("arm") is True for order in recorded.orders())
         self._now_s = math.nan
         self._fresh = False  # the time after a wait was not asked for yet
         self._frames = frames
@@ -99,7 +97,7 @@ class ReplayRig:
         """Return what the operator had ordered where the session asked for it."""
         found = []
         while self._kind() == tape.ORDER:
-            found.append(json.loads(self._take()))
+            found.append(tape.order_in(self._take()))
         return found
 
     def begin(self, t_start_s: float) -> None:

@@ -36,7 +36,7 @@ from hil.record.timeline import Timeline
 from hil.rigs.opening import REPLAY, is_simulated, open_rig
 from hil.runs.interruption import CtrlC
 from hil.runs.law_guard import GuardedLaw
-from hil.runs.orders import OperatorOrders, RetunedLaw, with_orders
+from hil.runs.orders import OperatorOrders, RetunedLaw, SteppedReference, with_orders
 from hil.runs.outside import fault_of
 from hil.runs.parts import Ending, Parts, Progress, Publish
 from hil.runs.session import Session
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from hil.core.types import OuterLaw, Pose, PoseMeasurement
     from hil.record.memory import RunSink
     from hil.record.reader import RunRecord
-    from hil.runs.orders import Source
+    from hil.runs.orders import OrderSource
     from hil.runs.watched import Watch
     from vision.tracker import Image, Localiser
 
@@ -117,7 +117,7 @@ def execute(
     rig: Rig | None = None,
     publish: Publish | None = None,
     watch: Watch | None = None,
-    orders: Source | None = None,
+    orders: OrderSource | None = None,
 ) -> RunRecord:
     """Run the spec and return its closed record; raises BadInput before anything is written.
 
@@ -299,7 +299,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
 
 
 def make_ordered_parts(
-    spec: RunSpec, rig: Rig, recorder: RunSink, source: Source, *, keep_gains: bool = False
+    spec: RunSpec, rig: Rig, recorder: RunSink, source: OrderSource, *, keep_gains: bool = False
 ) -> Parts:
     """Return the parts of a session whose operator may order; with `keep_gains`, not of the law."""
     entry, control = OUTER_LAWS.get(spec.outer), spec.scenario.control
@@ -307,8 +307,10 @@ def make_ordered_parts(
     law = RetunedLaw(entry, gains, lambda now: _bare_law(spec, entry, now))
     around = HoldAtGoal(law, control.limits) if _rests(entry) else law
     parts = make_parts(spec, rig, recorder, around)
-    orders = OperatorOrders(source, parts.link, parts.timeline, None if keep_gains else law)
-    return replace(parts, orders=orders)
+    goal = SteppedReference(parts.reference, spec.scenario.safety)
+    own = None if keep_gains else law
+    orders = OperatorOrders(source, parts.link, parts.timeline, goal, own)
+    return replace(parts, orders=orders, reference=goal)
 
 
 class _WhenAsked:

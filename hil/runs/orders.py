@@ -1,14 +1,16 @@
-"""What an operator orders while a run is on: arming by hand, and values of board and law changed live.
+"""What an operator orders while a run is on: arming by hand, values of board and law, steps of the goal.
 
 The session asks for orders while it holds at rest before arming, and once a tick; the tape keeps each where
 it was taken, so that an exact replay takes it there again. Nothing here reads a clock or waits.
 
 A value of the law counts from the tick on at which it was taken; one of the board goes out as a PARAM_SET,
-and counts once the board has answered. Both are one line of the record's events, kind "tuning".
+and counts once the board has answered. A step moves the goal at once, to see what the values make of it.
+Each is one line of the record's events, kind "tuning".
 """
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -25,8 +27,10 @@ from hil.core.text import visible
 from hil.wire import handshake
 
 if TYPE_CHECKING:
+    from hil.config.scenario import SafetyConfig
+    from hil.control.references import Reference
     from hil.core.registry import Entry
-    from hil.core.types import Estimate, OuterCommand, OuterLaw, ReferenceState
+    from hil.core.types import Estimate, OuterCommand, OuterLaw, ReferenceState, Vec2
     from hil.record.timeline import Timeline
     from hil.runs.execute import RunSpec
     from hil.wire.link import BoardLink, Procedure
@@ -37,6 +41,9 @@ EVENT = "tuning"
 BOARD, LAW = "board.", "law."
 # Robot found and shown, nobody arms: the run ends after so long.
 ARMED_WITHIN_S = 600.0
+# A goal moved by hand keeps this far from the fence; one step is at most so long.
+ROOM_M = 0.15
+STEP_MAX_M = 1.0
 # They choose what runs and are no numbers to turn; the manifest names the wheel law.
 _SWITCHES = frozenset({"LAW", "ST_SCHEME", "ST_VAR", "ISM_FORM"})
 
@@ -100,11 +107,18 @@ def change_of(known: Mapping[str, Tunable], law: Entry, key: str, value: float) 
     return {"set": key, "value": float(value)}
 
 
+def step_of(x_m: float, y_m: float) -> Order:
+    """Return the order that moves the goal (world); raises BadInput for one too long."""
+    if not math.hypot(x_m, y_m) <= STEP_MAX_M:
+        raise BadInput(f"step of ({x_m:g}, {y_m:g}) m: at most {STEP_MAX_M:g} m")
+    return {"step": [float(x_m), float(y_m)]}
+
+
 class RetunedLaw:
     """An outer law whose gains may be others from a tick on.
 
-    A law that has `retune(gains)` goes on with them from where it is. Any other is made anew and starts there,
-    as at the beginning of a run.
+    A law that has `retune(gains)` goes on with them from where it is. Any other is made anew and starts
+    there, as at the beginning of a run.
     """
 
     def __init__(self, entry: Entry, gains: Any, make: Callable[[Any], OuterLaw]) -> None:
@@ -129,15 +143,44 @@ class RetunedLaw:
         self, name: str, value: float, reference: ReferenceState, estimate: Estimate
     ) -> None:
         """Change one gain; raises ValidationError, AttributeError."""
-        self._gains = type(self._gains).model_validate(
-            self._gains.model_dump() | {name: value}
-        )
+        self._gains = type(self._gains).model_validate(self._gains.model_dump() | {name: value})
         retune = getattr(self._law, "retune", None)
         if retune is not None:
             retune(self._gains)
             return
         self._law = self._make(self._gains)
         self._law.reset(reference, estimate)
+
+
+class SteppedReference:
+    """A reference whose point can be moved by hand, within the fence less the robot's room."""
+
+    def __init__(self, reference: Reference, safety: SafetyConfig) -> None:
+        self._reference = reference
+        self._safety = safety
+        self._shift: Vec2 = (0.0, 0.0)
+        self._t_s = 0.0
+
+    def at(self, t_s: float) -> ReferenceState:
+        """Return the desired state `t_s` after the start of the run."""
+        state = self._reference.at(t_s)
+        self._t_s = t_s
+        if self._shift == (0.0, 0.0):
+            return state
+        x, y = state.z1_m
+        return replace(state, z1_m=(x + self._shift[0], y + self._shift[1]))
+
+    def step(self, x_m: float, y_m: float) -> None:
+        """Move the point from where it is; raises BadInput where it would come too near to the fence."""
+        x, y = self.at(self._t_s).z1_m
+        x, y, safety = x + x_m, y + y_m, self._safety
+        inside = (
+            safety.fence_x_min_m + ROOM_M <= x <= safety.fence_x_max_m - ROOM_M
+            and safety.fence_y_min_m + ROOM_M <= y <= safety.fence_y_max_m - ROOM_M
+        )
+        if not inside:
+            raise BadInput(f"step to ({x:.3f}, {y:.3f}) m: not within {ROOM_M:g} m of the fence")
+        self._shift = (self._shift[0] + x_m, self._shift[1] + y_m)
 
 
 class Orders(Protocol):
@@ -162,7 +205,7 @@ class NoOrders:
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class OrderSource:
     """Where orders come from; `held` says that the robot is armed by one of them."""
 
     take: Callable[[], Sequence[Order]]
@@ -173,13 +216,20 @@ class OperatorOrders:
     """Carries out what a source orders; `law` is None where its gains are not to be touched."""
 
     def __init__(
-        self, source: Source, link: BoardLink, timeline: Timeline, law: RetunedLaw | None
+        self,
+        source: OrderSource,
+        link: BoardLink,
+        timeline: Timeline,
+        goal: SteppedReference,
+        law: RetunedLaw | None,
     ) -> None:
         self._take = source.take
         self._held = source.held
         self._held_since_s: float | None = None
+        self.holding = False  # the robot was found, and nobody has armed it yet
         self._link = link
         self._timeline = timeline
+        self._goal = goal
         self._law = law
         self._for_board: deque[tuple[str, float]] = deque()
         # What was changed so far, in force; a new mapping each time, for whoever looks from beside.
@@ -191,10 +241,10 @@ class OperatorOrders:
             return False
         now_s = self._link.t_s
         if self._held_since_s is None:
-            self._held_since_s = now_s
+            self._held_since_s, self.holding = now_s, True
             self._note("operator", "robot found; it is armed by hand")
         if any(order.get("arm") is True for order in self._take()):
-            self._held = False
+            self._held = self.holding = False
             self._note("operator", "armed by hand")
         elif now_s - self._held_since_s > ARMED_WITHIN_S:
             raise RigFault(f"nobody armed the robot within {ARMED_WITHIN_S:g} s of its being found")
@@ -204,6 +254,8 @@ class OperatorOrders:
         """Take what was ordered since the tick before."""
         for order in self._take():
             key, value = str(order.get("set", "")), order.get("value")
+            if "step" in order:
+                self._step_goal(*order["step"])
             if not isinstance(value, int | float):
                 continue
             if key.startswith(LAW):
@@ -212,6 +264,14 @@ class OperatorOrders:
                 self._for_board.append((key.removeprefix(BOARD), float(value)))
         if self._for_board and not self._link.busy:
             self._link.begin(self._change_board())
+
+    def _step_goal(self, x_m: float, y_m: float) -> None:
+        try:
+            self._goal.step(x_m, y_m)
+        except BadInput as refused:
+            self._note(EVENT, str(refused))
+            return
+        self._note(EVENT, f"goal stepped by ({x_m:+.3f}, {y_m:+.3f}) m")
 
     def _change_law(
         self, name: str, value: float, reference: ReferenceState, estimate: Estimate
@@ -249,7 +309,7 @@ class OperatorOrders:
         self._timeline.event(self._link.t_s, kind, text)
 
 
-def with_orders(source: Source, taken: Callable[[Order], None]) -> Source:
+def with_orders(source: OrderSource, taken: Callable[[Order], None]) -> OrderSource:
     """Return a source that tells `taken` of each order it gives."""
 
     def take() -> Sequence[Order]:
