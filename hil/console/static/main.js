@@ -26,7 +26,7 @@ function show() {
   document.title = `${document.querySelector(`nav a[href="#${chosen}"]`).textContent} · hil console`;
 }
 
-const isOn = () => ["starting", "running", "stopping"].includes(phase);
+const isOn = () => ["starting", "ready", "running", "stopping"].includes(phase);
 function stop() {
   command({ do: "stop" });
 }
