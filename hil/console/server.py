@@ -20,6 +20,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from hil.console import campaigns, records, setup, tuning
 from hil.console.access import HEADERS, PAGE_POLICY, Gate
+from hil.console.bringup import BringUps
 from hil.console.choices import choices, describe, is_built_in
 from hil.console.folders import Folders
 from hil.console.listing import Listing
@@ -50,6 +51,7 @@ class Console:
     listing: Listing
     tasks: Tasks
     campaigns: campaigns.Campaigns
+    bringups: BringUps
     begins_with: tuple[str, str]  # target and camera
 
 
@@ -172,6 +174,7 @@ async def _socket(socket: WebSocket) -> None:
     console.people.came(page)
     console.live.greet(page)
     console.campaigns.greet(page)
+    console.bringups.greet(page)
     sending = asyncio.create_task(_send_newest(socket, page))
     try:
         while True:
@@ -200,28 +203,44 @@ async def _take(console: Console, page: Page, text: str) -> None:
         do = message["do"]
         if do == "stop":  # anybody's
             console.live.stop(name_of(page, console.people))
+            console.bringups.stop()
         elif do == "take":
             console.people.take_over(page)
         elif page.key != console.people.operator:
             page.put("said", {"error": "only the operator's page may do that"})
-        elif do == "beat":
-            console.live.beat()
-        elif do == "arm":
-            console.live.arm(bool(message["wanted"]))
-        elif do == "tune":
-            console.live.tuning.change(str(message["key"]), float(message["value"]))
-        elif do == "step":
-            console.live.tuning.step(float(message["x_m"]), float(message["y_m"]))
-        elif do == "undo":
-            console.live.tuning.undo()
         elif do == "release":
             console.people.let_go(page)
-        elif do == "start":
-            await console.live.start(order_of(message["order"]))
+        elif do in {"start", "bring-up"}:
+            await _begin(console, do, message["order"])
+        elif do in _ORDERS:
+            _ORDERS[do](console, message)
     except BadInput as error:
         page.put("said", {"error": str(error)})
     except (ValueError, KeyError, TypeError) as error:
         page.put("said", {"error": f"not understood: {type(error).__name__}"})
+
+
+# What the operator orders besides: small things that are done at once.
+_ORDERS: dict[str, Callable[[Console, dict[str, Any]], None]] = {
+    "beat": lambda console, _: console.live.beat(),
+    "arm": lambda console, told: console.live.arm(bool(told["wanted"])),
+    "answer": lambda console, told: console.bringups.answer(told["value"]),
+    "tune": lambda console, told: console.live.tuning.change(
+        str(told["key"]), float(told["value"])
+    ),
+    "step": lambda console, told: console.live.tuning.step(float(told["x_m"]), float(told["y_m"])),
+    "undo": lambda console, _: console.live.tuning.undo(),
+}
+
+
+async def _begin(console: Console, what: str, order: object) -> None:
+    """Begin a run or a bring-up, one at a time."""
+    if console.live.busy or console.bringups.busy:
+        raise BadInput("a run or a bring-up is on: STOP it first, or wait for its end")
+    if what == "start":
+        await console.live.start(order_of(order))
+    else:
+        await console.bringups.start(order)
 
 
 def application(
@@ -233,7 +252,7 @@ def application(
     live = Live(folders, people)
     console = Console(
         folders, gate, people, live, Listing(folders), tasks,
-        campaigns.Campaigns(folders, people), begins_with,
+        campaigns.Campaigns(folders, people), BringUps(folders, people), begins_with,
     )  # fmt: skip
 
     @contextlib.asynccontextmanager
@@ -242,6 +261,7 @@ def application(
         yield
         await reading
         await console.campaigns.close()
+        await console.bringups.close()
         await live.close()
 
     get = ["GET"]

@@ -60,6 +60,10 @@ class Tuning:
                 self._changes.append((key, before, value))
         self.values = values
 
+    def moved(self) -> dict[str, float]:
+        """Return the values that are others now than at the start."""
+        return {k: v for k, v in self.values.items() if v != self._start.get(k)}
+
     def change(self, key: str, value: float) -> None:
         """Change a value of board or law; raises BadInput where no run is on."""
         self._require_running()
@@ -158,11 +162,11 @@ def _robot_in(name: str, kind: str) -> str:
 async def _write(_request: Request, console: Console) -> Response:
     """Write what was changed in the run that is on, or was."""
     live = console.live
-    if live.order is None or not live.tuning.values:
+    if live.order is None or not live.tuning.moved():
         raise BadInput("tuning: nothing was changed, so that there is nothing to write")
     place = write_tuned(
         console.folders, live.order, live.begun["law"],
-        live.begun["scenario"]["control"]["gain_set"], live.tuning.values,
+        live.begun["scenario"]["control"]["gain_set"], live.tuning.moved(),
     )  # fmt: skip
     return answer_json(
         {"file": console.folders.name_of(place), "text": place.read_text(encoding="utf-8")}

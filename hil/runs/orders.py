@@ -77,13 +77,18 @@ def tunables(spec: RunSpec) -> dict[str, Tunable]:
     ]
     found += [
         Tunable(
-            f"{BOARD}{name}", spec.scenario.board[name], entry.unit, entry.doc,
+            f"{BOARD}{name}", _as_written(spec.scenario.board[name]), entry.unit, entry.doc,
             entry.minimum, entry.maximum, f"{entry.minimum:g} to {entry.maximum:g}",
         )
         for name, entry in board_table().items()
         if entry.live and name not in _SWITCHES
     ]  # fmt: skip
     return {item.key: item for item in found}
+
+
+def _as_written(value: float) -> float:
+    """Return a 32-bit float as somebody would write it: 0.16 and not 0.1599999964."""
+    return float(f"{value:.7g}")
 
 
 def change_of(known: Mapping[str, Tunable], law: Entry, key: str, value: float) -> Order:

@@ -161,7 +161,7 @@ when("picture", async ({ seen, jpeg }) => {
   byId("picture-said").textContent = seen.seen ? `robot seen at (${number(seen.x_m, 3)}, ${number(seen.y_m, 3)}) m, quality ${number(seen.quality)}` : "robot not seen";
 });
 
-const tune = (r) => tuning.took({ t: r[T], x: r[X], y: r[Y], rx: r[RX], ry: r[RY] });
+const tune = (r) => tuning.took({ t: r[T], ex: r[DX], ey: r[DY], rx: r[RX], ry: r[RY] });
 
 function forget() {
   trail = []; sigma = null; requirements = []; now = null; shownReport = "";

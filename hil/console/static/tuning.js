@@ -99,16 +99,16 @@ function told() {
   byId("tune-changes").scrollTop = 1e6;
 }
 
-// row: {t, x, y, rx, ry}; called for each new tick
+// row: {t, ex, ey: error, rx, ry: goal}; called for each new tick
 export function took(row) {
   if (last && Math.hypot(row.rx - last.rx, row.ry - last.ry) > STEP_M && row.t - last.t < 0.3) {
     const since = responses.length ? responses.at(-1).changes : 0;
-    responses.push({ t: row.t, x: last.rx, y: last.ry, dx: row.rx - last.rx, dy: row.ry - last.ry, points: [], changes: changes.length, after: changes.length - since });
+    responses.push({ t: row.t, dx: row.rx - last.rx, dy: row.ry - last.ry, points: [], changes: changes.length, after: changes.length - since });
     responses = responses.slice(-KEPT);
   }
   last = row;
   const now = responses.at(-1);
-  if (now && row.t - now.t <= SHOWN_S) now.points.push([row.t - now.t, ((row.x - now.x) * now.dx + (row.y - now.y) * now.dy) / (now.dx ** 2 + now.dy ** 2)]);
+  if (now && row.t - now.t <= SHOWN_S) now.points.push([row.t - now.t, 1 + (row.ex * now.dx + row.ey * now.dy) / (now.dx ** 2 + now.dy ** 2)]);
 }
 
 export function paint() {
