@@ -168,7 +168,7 @@ class HandOver:
             (row, image), self._frame = self._frame, None
             self._next_picture_s = now_s + 1.0 / _PICTURES_HZ
             packed = array("d", row).tobytes()
-            picture = b"" if image is None else _jpeg(image)
+            picture = b"" if image is None else jpeg(image)
             self._write(PICTURE, FRAME_LENGTH.pack(len(packed)) + packed + picture)
 
     def _write(self, kind: bytes, body: bytes) -> None:
@@ -177,7 +177,8 @@ class HandOver:
             self._out.flush()
 
 
-def _jpeg(image: NDArray[np.uint8]) -> bytes:
+def jpeg(image: NDArray[np.uint8]) -> bytes:
+    """Return a picture as JPEG, no wider than a page shows it."""
     height, width = image.shape[:2]
     if width > _PICTURE_WIDTH_PX:
         size = (_PICTURE_WIDTH_PX, round(height * _PICTURE_WIDTH_PX / width))

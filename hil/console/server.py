@@ -21,6 +21,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from hil.console import campaigns, records, setup, tuning
 from hil.console.access import HEADERS, PAGE_POLICY, Gate
 from hil.console.bringup import BringUps
+from hil.console.cameras import Cameras
 from hil.console.choices import choices, describe, is_built_in
 from hil.console.folders import Folders
 from hil.console.listing import Listing
@@ -52,6 +53,7 @@ class Console:
     tasks: Tasks
     campaigns: campaigns.Campaigns
     bringups: BringUps
+    cameras: Cameras
     begins_with: tuple[str, str]  # target and camera
 
 
@@ -175,6 +177,7 @@ async def _socket(socket: WebSocket) -> None:
     console.live.greet(page)
     console.campaigns.greet(page)
     console.bringups.greet(page)
+    console.cameras.greet(page)
     sending = asyncio.create_task(_send_newest(socket, page))
     try:
         while True:
@@ -212,6 +215,8 @@ async def _take(console: Console, page: Page, text: str) -> None:
             console.people.let_go(page)
         elif do in {"start", "bring-up"}:
             await _begin(console, do, message["order"])
+        elif do == "look":
+            await _look(console, message)
         elif do in _ORDERS:
             _ORDERS[do](console, message)
     except BadInput as error:
@@ -233,10 +238,24 @@ _ORDERS: dict[str, Callable[[Console, dict[str, Any]], None]] = {
 }
 
 
+async def _look(console: Console, message: dict[str, Any]) -> None:
+    """Look at a camera, or do something with what is looked at."""
+    what = message["what"]
+    if what == "close":
+        await console.cameras.close()
+    elif what == "open":
+        if console.live.busy:
+            raise BadInput("a run is on and may have the camera: wait for its end")
+        await console.cameras.open(message["camera"])
+    else:
+        console.cameras.order(message)
+
+
 async def _begin(console: Console, what: str, order: object) -> None:
     """Begin a run or a bring-up, one at a time."""
     if console.live.busy or console.bringups.busy:
         raise BadInput("a run or a bring-up is on: STOP it first, or wait for its end")
+    await console.cameras.close()  # a run may want the same one
     if what == "start":
         await console.live.start(order_of(order))
     else:
@@ -252,7 +271,8 @@ def application(
     live = Live(folders, people)
     console = Console(
         folders, gate, people, live, Listing(folders), tasks,
-        campaigns.Campaigns(folders, people), BringUps(folders, people), begins_with,
+        campaigns.Campaigns(folders, people), BringUps(folders, people),
+        Cameras(folders, people), begins_with,
     )  # fmt: skip
 
     @contextlib.asynccontextmanager
@@ -262,6 +282,7 @@ def application(
         await reading
         await console.campaigns.close()
         await console.bringups.close()
+        await console.cameras.close()
         await live.close()
 
     get = ["GET"]
