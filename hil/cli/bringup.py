@@ -95,14 +95,10 @@ def _require_port(device: str) -> None:
 def _run(
     device: str, baud: int, believed: RobotConfig, turns: float, yes: bool, floor: bool
 ) -> Report:
-    from hil.config.control import OuterLimits
     from hil.rigs.serial import SerialRig
-    from hil.tools.bringup.procedure import BringUp, Plan
+    from hil.tools.bringup.procedure import BringUp, plan_for
 
-    limits = OuterLimits()
-    rim_m_s = limits.eta1_max_m_s + limits.theta_dot_max_rad_s * believed.track_m / 2.0
-    turn_rad_s = limits.theta_dot_max_rad_s if floor else None
-    plan = Plan(believed, rim_m_s / believed.wheel_radius_m, turns, turn_rad_s)
+    plan = plan_for(believed, turns, floor=floor)
     rig = SerialRig(device, baud, None)
     try:
         return BringUp(rig, Nobody() if yes else Person(), plan, _tell).run()

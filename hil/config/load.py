@@ -20,6 +20,7 @@ from hil.config.own_settings import BY_NAME_KEY, PLACES, model_at, renew
 from hil.config.path_file import fill_path
 from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
+from hil.config.with_robot import lifted, refuse_all_but_gains
 from hil.core.errors import BadInput
 from hil.core.files import parse_toml, read_text
 from hil.core.registry import is_file_name
@@ -100,7 +101,8 @@ def _with_file(tree: Tree, text: str) -> Tree:
     if part is None:
         return tree
     value = parse_value(text.partition("=")[2])
-    return merge(tree, {part: _part_tree(str(value), part)})
+    below = _part_tree(str(value), part)
+    return merge(tree, lifted(below) | {part: below})
 
 
 def _part_tree(name_or_path: str, part: str, above: tuple[str, ...] = ()) -> Tree:
@@ -108,6 +110,7 @@ def _part_tree(name_or_path: str, part: str, above: tuple[str, ...] = ()) -> Tre
     tree = read_tree(name_or_path, f"{part}s", above)
     if part == "robot":
         tree.setdefault("vehicle", {"kind": _SKID_STEER})
+        refuse_all_but_gains(tree, name_or_path)
     return tree
 
 
@@ -132,6 +135,7 @@ def read_tree(name_or_path: str, kind: str, above: tuple[str, ...] = ()) -> Tree
         if isinstance(tree.get(part), Mapping) and "file" in tree[part]:
             own = dict(tree[part])
             below = _part_tree(_beside(folder, str(own.pop("file"))), part, above)
+            tree = merge(lifted(below), tree)
             tree[part] = merge(below, own)
     _set_files_beside(tree, folder)
     fill_path(tree, folder)
@@ -183,7 +187,9 @@ def _base_kind(base: str, kind: str) -> str:
 
 def load_robot(name_or_path: str) -> RobotConfig:
     """Return a robot by its built-in name or file; raises BadInput."""
-    return build(RobotConfig, read_tree(name_or_path, "robots"), name_or_path)
+    tree = read_tree(name_or_path, "robots")
+    lifted(tree)
+    return build(RobotConfig, tree, name_or_path)
 
 
 def _beside(folder: Path | None, name: str) -> str:

@@ -8,17 +8,20 @@ meanwhile is dropped. A message is a kind byte, its length, and its bytes.
 from __future__ import annotations
 
 import json
+import math
 import struct
 import threading
 import time
 from array import array
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import cv2
 
 from hil.control.references import make_reference
+from hil.record.schema import FRAME_NAMES
+from hil.runs.orders import OperatorOrders
 
 if TYPE_CHECKING:
     import numpy as np
@@ -55,6 +58,9 @@ class HandOver:
         self._notes: deque[tuple[str, str]] = deque(maxlen=20)
         self._frame: tuple[Sequence[float], NDArray[np.uint8] | None] | None = None
         self._sigma: list[float] | None = None
+        self._parts: Parts | None = None
+        self._changed: Mapping[str, float] = {}
+        self._holding = False
         self._covariance: Callable[[], Any] | None = None
         self._start_s = 0.0
         self._ended = threading.Event()
@@ -66,7 +72,9 @@ class HandOver:
     # -- in the control loop -------------------------------------------------------------------
 
     def began(self, parts: Parts) -> None:
-        """Take the estimator, whose covariance is shown where it has one."""
+        """Take the estimator, whose covariance is shown where it has one, and the frames before the start."""
+        self._parts = parts
+        parts.timeline.early = self.frame
         estimator: Any = parts.estimator
         if hasattr(type(estimator), "covariance"):
             self._covariance = lambda: estimator.covariance
@@ -121,7 +129,27 @@ class HandOver:
         except OSError:
             return  # nobody reads any more; the run goes on, or is stopped by the closed command pipe
 
+    def _send_orders(self) -> None:
+        """Send the robot as found while it waits to be armed, and the values that were changed."""
+        parts = self._parts
+        if parts is None or not isinstance(parts.orders, OperatorOrders):
+            return
+        orders, link = parts.orders, parts.link
+        if orders.holding:
+            frame = self._frame
+            seen = dict(zip(FRAME_NAMES, frame[0], strict=True)) if frame is not None else {}
+            pose = [seen.get(name, math.nan) for name in ("x_m", "y_m", "theta_rad")]
+            board = link.info.build_id if link.info is not None else ""
+            self.say(found={"pose": pose, "battery_v": link.battery_v, "firmware": board})
+        elif self._holding:
+            self.say(armed=True)
+        self._holding = orders.holding
+        if orders.changed is not self._changed:
+            self._changed = orders.changed
+            self.say(tuned=dict(self._changed))
+
     def _send_newest(self) -> None:
+        self._send_orders()
         rows = array("d")
         while self._rows:
             rows.extend(self._rows.popleft())
@@ -140,7 +168,7 @@ class HandOver:
             (row, image), self._frame = self._frame, None
             self._next_picture_s = now_s + 1.0 / _PICTURES_HZ
             packed = array("d", row).tobytes()
-            picture = b"" if image is None else _jpeg(image)
+            picture = b"" if image is None else jpeg(image)
             self._write(PICTURE, FRAME_LENGTH.pack(len(packed)) + packed + picture)
 
     def _write(self, kind: bytes, body: bytes) -> None:
@@ -149,7 +177,8 @@ class HandOver:
             self._out.flush()
 
 
-def _jpeg(image: NDArray[np.uint8]) -> bytes:
+def jpeg(image: NDArray[np.uint8]) -> bytes:
+    """Return a picture as JPEG, no wider than a page shows it."""
     height, width = image.shape[:2]
     if width > _PICTURE_WIDTH_PX:
         size = (_PICTURE_WIDTH_PX, round(height * _PICTURE_WIDTH_PX / width))

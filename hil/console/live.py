@@ -24,6 +24,7 @@ from hil.console.folders import Folders
 from hil.console.hand_over import FRAME_LENGTH, HEAD, PICTURE, ROWS
 from hil.console.orders import Order, inside
 from hil.console.people import Message, Page, People
+from hil.console.tuning import Tuning
 from hil.core.errors import BadInput
 
 # What a page draws over time, in this order; error and |s| are worked out.
@@ -61,7 +62,8 @@ class Live:
         self._armed_until_s = -math.inf
         self._stop_s = -math.inf
         self._run_id = 0
-        self.phase = "idle"  # idle, starting, running, stopping, ended
+        self.tuning = Tuning(lambda: self.phase == "running", self._say)
+        self.phase = "idle"  # idle, starting, ready (to be armed), running, stopping, ended
         self.order: Order | None = None
         self._forget()
 
@@ -76,6 +78,8 @@ class Live:
         self._sigma: list[float] | None = None
         self._misses = 0
         self._picture: bytes | None = None
+        self._found: Message = {}
+        self.tuning.begin([])
 
     # -- what a page asks ------------------------------------------------------------------------
 
@@ -85,12 +89,20 @@ class Live:
         return self._process is not None
 
     @property
+    def begun(self) -> Message:
+        """Return what the run said when it began; empty before."""
+        return self._begin
+
+    @property
     def armed(self) -> bool:
         """True while the operator has armed and not started yet."""
         return time.monotonic() < self._armed_until_s
 
     def arm(self, wanted: bool) -> None:
-        """Arm by hand, for ARMED_S, or lay it down."""
+        """Arm the robot that a run has found; else a simulated run, for ARMED_S, or lay it down."""
+        if self.phase == "ready" and wanted:
+            self._say(arm=True)
+            return
         wanted = wanted and not self.busy
         self._armed_until_s = time.monotonic() + ARMED_S if wanted else -math.inf
         if wanted:
@@ -111,6 +123,8 @@ class Live:
             "begin": {k: v for k, v in self._begin.items() if k not in {"names", "frame_names"}},
             "end": self._end,
             "refused": self._refused,
+            "found": self._found,
+            "tuned": self.tuning.message(),
         }
 
     def tell(self) -> None:
@@ -144,10 +158,13 @@ class Live:
             log.close()
 
     async def start(self, order: Order) -> None:
-        """Start a run; raises BadInput while another is on, where it was not armed, for files elsewhere."""
+        """Start a run; raises BadInput while another is on, for files elsewhere, and where it was not armed.
+
+        A real robot is armed later, when it was found: only a simulated one is armed before.
+        """
         if self.busy:
             raise BadInput("a run is on: STOP it first, or wait for its end")
-        if not self.armed:
+        if not self.armed and not order.armed_by_hand:
             raise BadInput("not armed: arm first, then start")
         inside(order, self._folders)
         self._armed_until_s = -math.inf
@@ -234,9 +251,34 @@ class Live:
         else:
             self._take_message(json.loads(body))
 
+    def _take_order(self, message: Message) -> bool:
+        """Take what came of the operator's orders; return whether it was that."""
+        if "found" in message:
+            self._found = message["found"]
+            self._people.tell("found", self._found)
+            if self.phase == "starting":
+                self.phase = "ready"
+                self.tell()
+        elif "armed" in message:
+            self.phase = "running" if self.phase == "ready" else self.phase
+            self.tell()
+        elif "tuned" in message:
+            self.tuning.take(message["tuned"])
+            self._people.tell("tuned", self.tuning.message())
+        elif "said" in message:
+            self._people.tell("said", {"error": message["said"]})
+        else:
+            return False
+        return True
+
     def _take_message(self, message: Message) -> None:
+        if self._take_order(message):
+            return
         if "begin" in message:
-            self._begin, self.phase = message["begin"], "running"
+            self._begin = message["begin"]
+            self.tuning.begin(self._begin["tunables"])
+            if not self._begin["by_hand"] and self.phase == "starting":
+                self.phase = "running"
             names = self._begin["names"]
             self._trail_at = [names.index(name) for name in TRAIL]
             self._now_at = {name: names.index(name) for name in NOW}

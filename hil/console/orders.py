@@ -44,6 +44,11 @@ class Order(BaseModel):
         """Say whether time is simulated, so that a run may be watched at its own speed."""
         return is_simulated(self.target)
 
+    @property
+    def armed_by_hand(self) -> bool:
+        """Say whether the run waits, its robot found and shown, until the operator arms it."""
+        return not self.simulated and not self.target.startswith(REPLAY)
+
     def command(self) -> str:
         """Return the command line of the same run."""
         words = ["hil", "run", self.scenario]
@@ -87,7 +92,7 @@ def inside(order: Order, folders: Folders) -> Order:
             "scenario": scenario,
             "law": law,
             "target": _target(order.target, folders),
-            "camera": _camera(order.camera, folders),
+            "camera": camera_of(order.camera, folders),
             "overrides": tuple(_override(text, folders) for text in order.overrides),
         }
     )
@@ -100,7 +105,8 @@ def _target(target: str, folders: Folders) -> str:
     return target
 
 
-def _camera(camera: str, folders: Folders) -> str:
+def camera_of(camera: str, folders: Folders) -> str:
+    """Return the camera that a page names, a file whole; raises BadInput."""
     if camera in {"", "rendered", "pose"} or camera.isdigit():
         return camera
     if camera.startswith("twin:"):

@@ -18,8 +18,10 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from hil.console import campaigns, records, setup
+from hil.console import campaigns, records, setup, tuning
 from hil.console.access import HEADERS, PAGE_POLICY, Gate
+from hil.console.bringup import BringUps
+from hil.console.cameras import Cameras
 from hil.console.choices import choices, describe, is_built_in
 from hil.console.folders import Folders
 from hil.console.listing import Listing
@@ -50,6 +52,8 @@ class Console:
     listing: Listing
     tasks: Tasks
     campaigns: campaigns.Campaigns
+    bringups: BringUps
+    cameras: Cameras
     begins_with: tuple[str, str]  # target and camera
 
 
@@ -172,6 +176,8 @@ async def _socket(socket: WebSocket) -> None:
     console.people.came(page)
     console.live.greet(page)
     console.campaigns.greet(page)
+    console.bringups.greet(page)
+    console.cameras.greet(page)
     sending = asyncio.create_task(_send_newest(socket, page))
     try:
         while True:
@@ -200,22 +206,60 @@ async def _take(console: Console, page: Page, text: str) -> None:
         do = message["do"]
         if do == "stop":  # anybody's
             console.live.stop(name_of(page, console.people))
+            console.bringups.stop()
         elif do == "take":
             console.people.take_over(page)
         elif page.key != console.people.operator:
             page.put("said", {"error": "only the operator's page may do that"})
-        elif do == "beat":
-            console.live.beat()
-        elif do == "arm":
-            console.live.arm(bool(message["wanted"]))
         elif do == "release":
             console.people.let_go(page)
-        elif do == "start":
-            await console.live.start(order_of(message["order"]))
+        elif do in {"start", "bring-up"}:
+            await _begin(console, do, message["order"])
+        elif do == "look":
+            await _look(console, message)
+        elif do in _ORDERS:
+            _ORDERS[do](console, message)
     except BadInput as error:
         page.put("said", {"error": str(error)})
     except (ValueError, KeyError, TypeError) as error:
         page.put("said", {"error": f"not understood: {type(error).__name__}"})
+
+
+# What the operator orders besides: small things that are done at once.
+_ORDERS: dict[str, Callable[[Console, dict[str, Any]], None]] = {
+    "beat": lambda console, _: console.live.beat(),
+    "arm": lambda console, told: console.live.arm(bool(told["wanted"])),
+    "answer": lambda console, told: console.bringups.answer(told["value"]),
+    "tune": lambda console, told: console.live.tuning.change(
+        str(told["key"]), float(told["value"])
+    ),
+    "step": lambda console, told: console.live.tuning.step(float(told["x_m"]), float(told["y_m"])),
+    "undo": lambda console, _: console.live.tuning.undo(),
+}
+
+
+async def _look(console: Console, message: dict[str, Any]) -> None:
+    """Look at a camera, or do something with what is looked at."""
+    what = message["what"]
+    if what == "close":
+        await console.cameras.close()
+    elif what == "open":
+        if console.live.busy:
+            raise BadInput("a run is on and may have the camera: wait for its end")
+        await console.cameras.open(message["camera"])
+    else:
+        console.cameras.order(message)
+
+
+async def _begin(console: Console, what: str, order: object) -> None:
+    """Begin a run or a bring-up, one at a time."""
+    if console.live.busy or console.bringups.busy:
+        raise BadInput("a run or a bring-up is on: STOP it first, or wait for its end")
+    await console.cameras.close()  # a run may want the same one
+    if what == "start":
+        await console.live.start(order_of(order))
+    else:
+        await console.bringups.start(order)
 
 
 def application(
@@ -227,7 +271,8 @@ def application(
     live = Live(folders, people)
     console = Console(
         folders, gate, people, live, Listing(folders), tasks,
-        campaigns.Campaigns(folders, people), begins_with,
+        campaigns.Campaigns(folders, people), BringUps(folders, people),
+        Cameras(folders, people), begins_with,
     )  # fmt: skip
 
     @contextlib.asynccontextmanager
@@ -236,6 +281,8 @@ def application(
         yield
         await reading
         await console.campaigns.close()
+        await console.bringups.close()
+        await console.cameras.close()
         await live.close()
 
     get = ["GET"]
@@ -264,4 +311,4 @@ def application(
 
 
 _LOOKED_AT = records.LOOKED_AT | setup.LOOKED_AT | campaigns.LOOKED_AT
-_CHANGED = records.CHANGED | setup.CHANGED | campaigns.CHANGED
+_CHANGED = records.CHANGED | setup.CHANGED | campaigns.CHANGED | tuning.CHANGED

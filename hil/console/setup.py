@@ -31,13 +31,13 @@ SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff")
 _PICTURE_BYTES = 40_000_000
 _PICTURES_MOST = 200
 _NAME = re.compile(r"[\w][\w .()+-]{0,118}", re.ASCII)
-_BOARD = re.compile(r"(charuco|charuco-old|chess):\d{1,2}x\d{1,2}:[\d.]{1,8}(:[\d.]{1,8})?")
-_SETS = ("lens", "floor", "colours")
+BOARD = re.compile(r"(charuco|charuco-old|chess):\d{1,2}x\d{1,2}:[\d.]{1,8}(:[\d.]{1,8})?")
+SETS = ("lens", "floor", "colours")
 
 
 def _folder(folders: Folders, which: object) -> Path:
-    if which not in _SETS:
-        raise BadInput(f"pictures: {which!r}: choose {', '.join(_SETS)}")
+    if which not in SETS:
+        raise BadInput(f"pictures: {which!r}: choose {', '.join(SETS)}")
     folder = folders.set_up / PICTURES / str(which)
     folder.mkdir(parents=True, exist_ok=True)
     return folder
@@ -130,7 +130,7 @@ async def _calibrate(request: Request, console: Console) -> Response:
 
 def _lens(tree: dict[str, Any], folders: Folders) -> list[str]:
     board = str(tree.get("board", ""))
-    if not _BOARD.fullmatch(board):
+    if not BOARD.fullmatch(board):
         raise BadInput(
             f"board {visible(board)}: give charuco:COLUMNSxROWS:SQUARE_MM:MARKER_MM or "
             "chess:COLUMNSxROWS:SQUARE_MM, in squares"

@@ -14,19 +14,24 @@ import select
 import signal
 import sys
 import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, NoReturn
 
 from hil.console.folders import Folders
 from hil.console.hand_over import HandOver, floor_of
 from hil.console.orders import Order, order_of, spec_of
 from hil.console.reports import write_report
-from hil.core.errors import HilError
+from hil.core.errors import BadInput, HilError
+from hil.core.registries import OUTER_LAWS
 from hil.record.layout import MANIFEST
 from hil.record.reader import read_run
 from hil.record.schema import FRAME_NAMES
 from hil.runs.execute import exit_status, make_manifest
 from hil.runs.interruption import take_signals
+from hil.runs.orders import ARM, OrderSource, change_of, step_of, tunables
 
 if TYPE_CHECKING:
     from hil.record.reader import RunRecord
@@ -45,6 +50,8 @@ class Commands:
         self._hand_over = hand_over
         self._limit_s = DEAD_MAN_S if dead_man else None
         self._ended = False
+        self._orders: deque[Any] = deque()
+        self.change: Callable[[str, float], Any] = _nothing_yet
         self._rest = b""
         threading.Thread(target=self._listen, name="commands", daemon=True).start()
 
@@ -71,11 +78,30 @@ class Commands:
     def _take(self, message: dict[str, Any]) -> None:
         if "note" in message:
             self._hand_over.note("operator", str(message["note"]))
+        elif message.get("arm") is True:
+            self._orders.append(ARM)
+        elif "set" in message or "step" in message:
+            try:
+                self._orders.append(
+                    step_of(*message["step"])
+                    if "step" in message
+                    else self.change(str(message["set"]), float(message["value"]))
+                )
+            except BadInput as error:
+                self._hand_over.say(said=str(error))
+
+    def take(self) -> list[Any]:
+        """Return what was ordered since the last call; the run's thread asks."""
+        return [self._orders.popleft() for _ in range(len(self._orders))]
 
     def _stop(self, why: str) -> None:
         if not self._ended:
             self._hand_over.note("operator", f"stopped: {why}")
             os.kill(os.getpid(), signal.SIGINT)
+
+
+def _nothing_yet(key: str, _value: float) -> NoReturn:
+    raise BadInput(f"{key}: the run has not begun yet")
 
 
 def main() -> int:
@@ -99,7 +125,7 @@ def main() -> int:
     hand_over = HandOver(out, order.real_time and order.simulated)
     commands = Commands(sys.stdin.buffer, hand_over, order.dead_man)
     try:
-        record = _run(order, folders, hand_over)
+        record = _run(order, folders, hand_over, commands)
         commands.close()
         hand_over.close()
         hand_over.say(end=end_of(record, folders))
@@ -121,11 +147,13 @@ def main() -> int:
         raise
 
 
-def _run(order: Order, folders: Folders, hand_over: HandOver) -> RunRecord:
+def _run(order: Order, folders: Folders, hand_over: HandOver, commands: Commands) -> RunRecord:
     from hil.runs.execute import execute  # noqa: PLC0415 - beside its first use
 
     spec = spec_of(order, folders)
     manifest = make_manifest(spec)
+    known, law = tunables(spec), OUTER_LAWS.get(spec.outer)
+    commands.change = lambda key, value: change_of(known, law, key, value)
     hand_over.say(
         begin={
             "record": folders.name_of(spec.out),
@@ -137,10 +165,14 @@ def _run(order: Order, folders: Folders, hand_over: HandOver) -> RunRecord:
             "seed": spec.seed,
             "floor": floor_of(spec.scenario),
             "notes": manifest.notes,
+            "by_hand": order.armed_by_hand,
+            "tunables": [asdict(item) for item in known.values()],
         }
     )
     try:
-        return execute(spec, watch=hand_over)
+        return execute(
+            spec, watch=hand_over, orders=OrderSource(commands.take, order.armed_by_hand)
+        )
     except KeyboardInterrupt:
         if not (spec.out / MANIFEST).is_file():
             raise

@@ -1,9 +1,9 @@
 """`inputs.tape`: everything a session was told from below, in order, so that it can be told again.
 
-A session learns of the world in four ways: what the host clock shows, which bytes have arrived,
-that a frame has arrived, and that something broke. The tape holds just that, clock readings as
-float64 and bytes as they came (good or damaged). With frames.parquet, or camera.mkv, beside it a
-replay is exact on any target, also where the clock is the wall's (docs/replay.md).
+A session learns of the world in five ways: what the host clock shows, which bytes have arrived,
+that a frame has arrived, that something broke, and what an operator orders. The tape holds just that,
+clock readings as float64, bytes as they came (good or damaged), an order as JSON. With frames.parquet,
+or camera.mkv, beside it a replay is exact on any target, also where the clock is the wall's (docs/replay.md).
 
 One line of JSON, then entries: a kind byte and its value. A torn last entry is left by the reader.
 """
@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hil.core.errors import BadInput, RigFault
 from hil.core.rig import PORT_BYTES, PortStream, discard_unsent
@@ -32,6 +32,7 @@ _BLOCK = struct.Struct("<cI")
 CLOCK, WAITED = b"C", b"W"
 BYTES, FRAME = b"R", b"F"
 FAULT, INTERRUPT = b"X", b"K"
+ORDER = b"O"
 # In which call that was: the first byte of the entry's value.
 IN_READ, IN_WRITE, IN_WAIT = b"r", b"w", b"t"
 
@@ -53,6 +54,11 @@ class TapeWriter:
     def close(self) -> None:
         """Flush and close; safe to call twice."""
         self._file.close()
+
+    def order(self, order: Mapping[str, Any]) -> None:
+        """Note what an operator ordered, where the session took it."""
+        text = json.dumps(order).encode()
+        self.write(_BLOCK.pack(ORDER, len(text)) + text)
 
     def stop(self, place: bytes, cause: BaseException) -> None:
         """Note that the rig broke, or that the user stopped the run, in this very call."""
@@ -158,6 +164,16 @@ class Tape:
     entries: tuple[Entry, ...]
     problem: str = ""
 
+    def orders(self) -> list[dict[str, Any]]:
+        """Return everything that an operator ordered, in order."""
+        return [order_in(value) for kind, value in self.entries if kind == ORDER]
+
+
+def order_in(value: float | bytes) -> dict[str, Any]:
+    """Return the order of an entry of this kind."""
+    found: dict[str, Any] = json.loads(value) if isinstance(value, bytes) else {}
+    return found
+
 
 def read_tape(path: Path) -> Tape:
     """Return what is whole of a tape; raises BadInput for a file that is none."""
@@ -180,7 +196,7 @@ def read_tape(path: Path) -> Tape:
     return Tape(tuple(entries))
 
 
-_KINDS = (CLOCK, WAITED, BYTES, FRAME, FAULT, INTERRUPT)
+_KINDS = (CLOCK, WAITED, BYTES, FRAME, FAULT, INTERRUPT, ORDER)
 
 
 def _entry_at(data: bytes, at: int) -> tuple[Entry, int] | None:

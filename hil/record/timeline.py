@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from hil.record.tick_rows import frame_row
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from hil.core.rig import Frame
     from hil.core.types import PoseMeasurement
     from hil.record.memory import RunSink
@@ -25,6 +28,8 @@ class Timeline:
         self._unix_us = unix_us
         self._origin_s: float | None = None
         self._held: list[tuple[float, Callable[[float], None]]] = []
+        # Is given each frame that is held back, with the host's time in its row: to be looked at only.
+        self.early: Callable[[Sequence[float], NDArray[np.uint8] | None], None] | None = None
 
     def start(self, t_host_s: float) -> None:
         """Make `t_host_s` the record's zero; a second call changes nothing."""
@@ -64,6 +69,8 @@ class Timeline:
             row = frame_row(frame, t_s, t_s - latency_s, measurement)
             self._recorder.frame(row, frame.picture)
             return
+        if self.early is not None:
+            self.early(frame_row(frame, t_host_s, t_exposure_s, measurement), frame.image)
         self._at(
             t_host_s,
             lambda t_s: self._recorder.frame(

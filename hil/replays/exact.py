@@ -25,7 +25,8 @@ from hil.record.source import Source, load_plugins, read_source, recorded_scenar
 from hil.record.tlog import LoggedFrame
 from hil.replays.divergence import Channel, compare_columns, compare_link
 from hil.rigs.replay import HAPPENED, open_replay
-from hil.runs.execute import RunSpec, board_parameters, make_parts, trace_terms
+from hil.runs.execute import RunSpec, board_parameters, make_ordered_parts, trace_terms
+from hil.runs.orders import OrderSource
 from hil.runs.parts import Ending
 from hil.runs.session import Session
 from hil.wire.identity import board_hashes
@@ -124,7 +125,9 @@ def replay(
     terms = trace_terms(OUTER_LAWS.get(law))
     recorder = MemoryRecorder(source.manifest.model_copy(update={"trace": terms}), keep_link=True)
     rig = open_replay(source, recorded)
-    parts = make_parts(spec, rig, recorder)
+    # A shadow shows what the gains it was given would command: those ordered in the record are not its own.
+    orders = OrderSource(rig.take_orders, rig.was_held)
+    parts = make_ordered_parts(spec, rig, recorder, orders, keep_gains=kind == "shadow")
     shadow = Shadow(parts.law, source.samples) if kind == "shadow" else None
     parts = replace(parts, law=shadow or parts.law)
     # The board's parameters are in the record whatever is changed here.

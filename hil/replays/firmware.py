@@ -40,7 +40,8 @@ if TYPE_CHECKING:
 PHASES_US = tuple(range(-2000, 2001, 500))
 _LEAST_REPORTS = 10
 _WRAP_US = 1 << 32
-# Sent by the host before the first tick that counts; set here instead, or of no effect on PWM.
+# Sent by the host before the first tick that counts; set here instead, or of no effect on PWM. Parameters
+# set behind the arming were changed live and go to this firmware as well.
 _LEFT_OUT = frozenset(
     {
         dialect.MAVLINK_MSG_ID_PARAM_SET,
@@ -251,11 +252,13 @@ def sent_frames(source: Source, arrivals: Mapping[int, int]) -> list[Sent]:
     """Return the host's frames in the order and at the times at which the board had them."""
     timed: list[tuple[int, int | None, bytes]] = []
     delays = []
+    armed = False
     for logged in source.link:
         if logged.frame[5] == BOARD_SYSTEM:
             continue
         msg_id = int.from_bytes(logged.frame[7:10], "little")
-        if msg_id in _LEFT_OUT:
+        armed = armed or _arms(msg_id, logged.frame)
+        if msg_id in _LEFT_OUT and not (armed and msg_id == dialect.MAVLINK_MSG_ID_PARAM_SET):
             continue
         arrival = None
         if msg_id == dialect.MAVLINK_MSG_ID_WHEEL_SETPOINT:
@@ -331,6 +334,10 @@ def _boot(writer: FrameWriter, parameters: Mapping[str, float], end_us: int) -> 
         )
         for i, (name, value) in enumerate(parameters.items())
     ]
+
+
+def _arms(msg_id: int, frame: bytes) -> bool:
+    return msg_id == dialect.MAVLINK_MSG_ID_COMMAND_LONG and is_arming(decoded(frame))
 
 
 def _own_arming(frame: bytes, own: int, writer: FrameWriter) -> bytes:

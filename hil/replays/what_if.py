@@ -19,7 +19,7 @@ from hil.config.scenario import Scenario, StartPose
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME
 from hil.core.registries import OUTER_LAWS
-from hil.record.source import load_plugins, read_source, recorded_scenario
+from hil.record.source import Source, load_plugins, read_source, recorded_scenario
 from hil.replays.fit import UNITS, Fit, Rehearsal, fit_twin
 from hil.report.compare import HEADLINES
 from hil.report.repeats import verdict
@@ -112,6 +112,7 @@ def what_if(
     source = read_source(path)
     manifest = source.manifest
     load_plugins(source)
+    _refuse_tuned(source)
     law, wheels = _other_law(manifest, outer, inner, overrides)
     recorded = recorded_scenario(manifest, path)
     rehearsal = Rehearsal(source, recorded)
@@ -139,6 +140,16 @@ def what_if(
         },
         ended_early=(_early(own), _early(other)),
     )
+
+
+def _refuse_tuned(source: Source) -> None:
+    """Raise BadInput for a run whose values were changed while it was on: it has no one law to set beside."""
+    changes = sum("set" in order for order in source.tape.orders())
+    if changes:
+        raise BadInput(
+            f"{source.path}: {changes} values were changed while it ran, so that no one law stands against "
+            "another; run the values as they were left (the record's events of kind tuning), and use that"
+        )
 
 
 def _other_law(

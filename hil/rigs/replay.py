@@ -48,6 +48,7 @@ class ReplayRig:
     ) -> None:
         self._entries: tuple[tuple[bytes, Any], ...] = recorded.entries
         self._at = 0
+        self.was_held = any(order.get("arm") is True for order in recorded.orders())
         self._now_s = math.nan
         self._fresh = False  # the time after a wait was not asked for yet
         self._frames = frames
@@ -91,6 +92,13 @@ class ReplayRig:
             return None
         self._at += 1
         return frame
+
+    def take_orders(self) -> list[dict[str, Any]]:
+        """Return what the operator had ordered where the session asked for it."""
+        found = []
+        while self._kind() == tape.ORDER:
+            found.append(tape.order_in(self._take()))
+        return found
 
     def begin(self, t_start_s: float) -> None:
         """Nothing counts from here: disturbances are in the record."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import cv2
 
@@ -18,7 +18,6 @@ from hil.config.limits import check_edges, wheel_speed_max_rad_s
 from hil.config.robot import BUILT_IN_PLANT
 from hil.control.estimators.making import make_estimator
 from hil.control.laws.hold import HoldAtGoal
-from hil.control.laws.making import make_outer_law
 from hil.control.laws.turn_first import TurnFirst
 from hil.control.laws.within import WithinWheelSpeed
 from hil.control.references import make_reference
@@ -45,6 +44,7 @@ from hil.record.timeline import Timeline
 from hil.rigs.opening import REPLAY, is_simulated, open_rig
 from hil.runs.interruption import CtrlC
 from hil.runs.law_guard import GuardedLaw
+from hil.runs.orders import OperatorOrders, RetunedLaw, SteppedReference, with_orders
 from hil.runs.outside import fault_of
 from hil.runs.parts import Ending, Parts, Progress, Publish
 from hil.runs.session import Session
@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from hil.core.types import OuterLaw, Pose, PoseMeasurement
     from hil.record.memory import RunSink
     from hil.record.reader import RunRecord
+    from hil.runs.orders import OrderSource
     from hil.runs.watched import Watch
     from vision.looking import Looker
 
@@ -124,6 +125,7 @@ def execute(
     rig: Rig | None = None,
     publish: Publish | None = None,
     watch: Watch | None = None,
+    orders: OrderSource | None = None,
 ) -> RunRecord:
     """Run the spec and return its closed record; raises BadInput before anything is written.
 
@@ -132,7 +134,7 @@ def execute(
     are left in good order.
 
     `rig` is another one than the spec's target names; it is closed here. `publish` is given the
-    estimate of every tick, `watch` everything that the record is given, after it.
+    estimate of every tick, `watch` everything that the record is given, after it; `orders` are an operator's.
     """
     cv2.setNumThreads(1)  # search windows are small: handing them to threads costs more
     check_fit(spec.scenario)
@@ -154,7 +156,12 @@ def execute(
             )
             sink = recorder if watch is None else WatchedSink(recorder, watch)
             try:
-                parts = make_parts(spec, TapedRig(rig, recorder.tape, ctrl_c.obey), sink, law)
+                taped = TapedRig(rig, recorder.tape, ctrl_c.obey)
+                if orders is None:
+                    parts = make_parts(spec, taped, sink, law)
+                else:
+                    noted = with_orders(orders, recorder.tape.order)
+                    parts = make_ordered_parts(spec, taped, sink, noted)
                 if watch is not None:
                     watch.began(parts)
                 session = Session(
@@ -226,13 +233,23 @@ def make_law(spec: RunSpec) -> OuterLaw:
 
     Raises BadInput for an unknown one, RigFault for one that fails while it is made.
     """
-    control, d0_m = spec.scenario.control, spec.scenario.robot.d0_m
+    control = spec.scenario.control
     entry = OUTER_LAWS.get(spec.outer)
+    law = _bare_law(spec, entry, control.active_gains.of(entry))
+    return HoldAtGoal(law, control.limits) if _rests(entry) else law
+
+
+def _bare_law(spec: RunSpec, entry: Entry, gains: Any) -> OuterLaw:
+    """Return the law with these gains, without the rest at the goal."""
+    limits, d0_m = spec.scenario.control.limits, spec.scenario.robot.d0_m
     if entry.origin == BUILT_IN:
-        return make_outer_law(spec.outer, control.active_gains, control.limits, d0_m)
-    gains, limits = control.active_gains.of(entry), control.limits
-    law = GuardedLaw(entry, lambda: entry.factory(gains, limits, d0_m), limits)
-    return HoldAtGoal(law, limits) if entry.extra.get("hold", True) else law
+        law: OuterLaw = entry.factory(gains, limits, d0_m)
+        return law
+    return GuardedLaw(entry, lambda: entry.factory(gains, limits, d0_m), limits)
+
+
+def _rests(entry: Entry) -> bool:
+    return entry.origin == BUILT_IN or bool(entry.extra.get("hold", True))
 
 
 def plugins_of(spec: RunSpec) -> list[Plugin]:
@@ -288,6 +305,21 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
         timeline=timeline,
         own_terms=tuple(OUTER_LAWS.get(spec.outer).trace),
     )
+
+
+def make_ordered_parts(
+    spec: RunSpec, rig: Rig, recorder: RunSink, source: OrderSource, *, keep_gains: bool = False
+) -> Parts:
+    """Return the parts of a session whose operator may order; with `keep_gains`, not of the law."""
+    entry, control = OUTER_LAWS.get(spec.outer), spec.scenario.control
+    gains = control.active_gains.of(entry)
+    law = RetunedLaw(entry, gains, lambda now: _bare_law(spec, entry, now))
+    around = HoldAtGoal(law, control.limits) if _rests(entry) else law
+    parts = make_parts(spec, rig, recorder, around)
+    goal = SteppedReference(parts.reference, spec.scenario.safety)
+    own = None if keep_gains else law
+    orders = OperatorOrders(source, parts.link, parts.timeline, goal, own)
+    return replace(parts, orders=orders, reference=goal)
 
 
 class _WhenAsked:

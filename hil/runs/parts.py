@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
+
+from hil.runs.orders import NoOrders, Orders
 
 if TYPE_CHECKING:
     from hil.control.references import Reference
@@ -37,6 +39,7 @@ class Parts:
     recorder: RunSink
     timeline: Timeline
     own_terms: tuple[str, ...] = ()  # of the law's trace, kept in columns of their own
+    orders: Orders = field(default_factory=NoOrders)  # of an operator, while the run is on
 
 
 @dataclass(frozen=True, slots=True)

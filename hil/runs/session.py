@@ -83,6 +83,7 @@ class Session:
         try:
             self._connect()
             self._find_robot()
+            self._pump_while(self._parts.orders.hold, math.inf)
             self._arm()
             yield from self._control()
             self.ending = Ending("complete")
@@ -181,6 +182,7 @@ class Session:
             yield Situation(now_s - self._t0_s, reference, estimate)
             if tick == 0:
                 law.reset(reference, estimate)
+            self._parts.orders.at_tick(reference, estimate)
             command = law.step(reference, estimate, period_s)
             left, right = wheels = self._command_wheels(now_s, command)
             self._watch.take_tick(

@@ -145,9 +145,14 @@ class SocketPage:
 
     def begin(self, **order: Any) -> None:
         """Arm and start, and wait until it is under way."""
-        self.say(do="arm", wanted=True)
+        real = str(order.get("target", "")).startswith("serial:")
+        if not real:
+            self.say(do="arm", wanted=True)
         self.say(do="start", order=order)
         self.until("state", phase="starting")
+        if real:  # found first, then armed
+            self.until("state", phase="ready")
+            self.say(do="arm", wanted=True)
 
     def ticks(self) -> list[Any]:
         """Wait for ticks; return their rows."""

@@ -82,8 +82,8 @@ def start(page, scenario, duration_s):
         page.fill("#setting", key)
         page.fill("#setting-value", str(value))
         page.click("#setting-add")
-    page.click("#arm")
     page.click("#start")
+    page.click("#arm")  # found first: it is enabled then
 
 
 def ended(page, text):

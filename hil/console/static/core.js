@@ -103,7 +103,7 @@ function heard(event) {
   if (event.data instanceof ArrayBuffer) {
     const size = new DataView(event.data).getUint32(0, true);
     const head = JSON.parse(new TextDecoder().decode(new Uint8Array(event.data, 4, size)));
-    tell("picture", { seen: head, jpeg: new Blob([new Uint8Array(event.data, 4 + size)], { type: "image/jpeg" }) });
+    tell(head.which === "camera" ? "camera-picture" : "picture", { seen: head, jpeg: new Blob([new Uint8Array(event.data, 4 + size)], { type: "image/jpeg" }) });
     return;
   }
   const message = JSON.parse(event.data);

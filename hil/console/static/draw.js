@@ -109,8 +109,8 @@ function ellipse(pen, [x, y], [xx, xy, yy], scale) {
   pen.stroke();
 }
 
-// lines: [{values: [[t, value], ...], ink, dash?}]; the range grows with what is seen and holds zero.
-export function drawChart(canvas, lines, end, unit) {
+// lines: [{values: [[t, value], ...], ink, dash?}], from `begin` to `end` s; the range grows with what is seen and holds zero.
+export function drawChart(canvas, lines, end, unit, begin = 0) {
   const place = ready(canvas);
   if (!place) return;
   const { pen, width, height } = place;
@@ -118,7 +118,7 @@ export function drawChart(canvas, lines, end, unit) {
   for (const { values } of lines) for (const [, v] of values) if (Number.isFinite(v)) { low = Math.min(low, v); high = Math.max(high, v); }
   if (high === low) high = 1;
   const left = 46, bottom = height - 18, top = 8, right = width - 8;
-  const px = (t) => left + (right - left) * (t / Math.max(end, 1e-9));
+  const px = (t) => left + (right - left) * ((t - begin) / Math.max(end - begin, 1e-9));
   const py = (v) => bottom - (bottom - top) * ((v - low) / (high - low));
   pen.fillStyle = colour("quiet");
   pen.textAlign = "right";

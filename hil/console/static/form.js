@@ -13,7 +13,7 @@ export function make(place, whenChanged) {
   changed = whenChanged;
   const scenario = el("select", { on: { change: tried(load) } });
   const law = el("select");
-  const target = el("input", { value: "twin", list: "targets", spellcheck: false, on: { input: simulatedOnly } });
+  const target = el("input", { value: "twin", list: "targets", spellcheck: false, on: { input: () => { simulatedOnly(); dispatchEvent(new Event("target-changed")); } } });
   fill(place,
     field("scenario", "Scenario", scenario), el("p", { class: "help", id: "scenario-said" }),
     el("div", { class: "fields" },
@@ -44,6 +44,7 @@ export async function refresh() {
   const cameras = [["pose", "no pictures, drawn errors"], ["rendered", "pictures"], ["0", "first camera"], ...choices.served.map((item) => [item.camera, item.summary])];
   fill(byId("cameras"), ...cameras.map(([value, text]) => el("option", { value }, text)));
   simulatedOnly();
+  dispatchEvent(new Event("target-changed"));
   await load();
   return choices;
 }

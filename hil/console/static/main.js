@@ -7,7 +7,7 @@ import * as campaigns from "./campaigns.js";
 
 const parts = { run, records, setup, campaigns };
 const made = new Set();
-let phase = "idle";
+let phase = "idle", bringUp = false;
 
 function show() {
   const [name] = (location.hash.slice(1) || "run").split("?");
@@ -26,7 +26,7 @@ function show() {
   document.title = `${document.querySelector(`nav a[href="#${chosen}"]`).textContent} · hil console`;
 }
 
-const isOn = () => ["starting", "running", "stopping"].includes(phase);
+const isOn = () => bringUp || ["starting", "ready", "running", "stopping"].includes(phase);
 function stop() {
   command({ do: "stop" });
 }
@@ -42,6 +42,10 @@ document.addEventListener("keydown", (event) => {
 
 when("state", (state) => {
   phase = state.phase;
+  byId("stop").classList.toggle("live", isOn());
+});
+when("bringup", (state) => {
+  bringUp = state.on;
   byId("stop").classList.toggle("live", isOn());
 });
 when("who", () => {

@@ -2,11 +2,12 @@
 import { byId, command, el, fill, number, tried, when, who } from "./core.js";
 import * as form from "./form.js";
 import { drawChart, drawFloor, drawPicture } from "./draw.js";
+import * as tuning from "./tuning.js";
 
 // In the order in which the console sends a tick.
 const T = 0, X = 1, Y = 2, TH = 3, TX = 4, TY = 5, RX = 6, RY = 7, DX = 8, DY = 9, SX = 10, SY = 11, EPS = 12,
   WCL = 13, WCR = 14, WL = 15, WR = 16, PL = 17, PR = 18;
-const ROWS = 4000;
+const ROWS = 4000, LONG_S = 60, WINDOW_S = 30;
 let state = { phase: "idle" };
 let floor = null, planned = [], trail = [], sigma = null, requirements = [], now = null, shownReport = "", drawn = false, armTimer = 0;
 
@@ -35,7 +36,7 @@ export function make(place) {
   fill(place, el("div", { class: "columns" },
     el("div", {},
       el("div", { class: "card" }, el("h2", {}, "1. What to run"), runForm),
-      el("div", { class: "card" }, el("h2", {}, "2. Arm, then start"),
+      el("div", { class: "card" }, el("h2", { id: "arm-title" }, "2. Arm, then start"),
         el("p", { id: "arm-said", class: "help" }),
         el("div", { class: "row" },
           el("button", { id: "arm", type: "button", on: { click: arm } }, "Arm"),
@@ -57,7 +58,8 @@ export function make(place) {
               el("p", { class: "help", id: "picture-said" })),
             el("h3", {}, "Requirements, as things stand"), el("ul", { class: "plain", id: "requirements" }),
             el("h3", {}, "Robot and link"), el("dl", { class: "facts", id: "facts" }),
-            el("h3", {}, "Events"), el("ul", { class: "plain log", id: "events", tabIndex: 0, "aria-label": "Events" })))),
+            el("h3", {}, "Events"), el("ul", { class: "plain log", id: "events", tabIndex: 0, "aria-label": "Events" }))),
+        tuning.make()),
       el("div", { class: "card", id: "report-box", hidden: true }, el("div", { class: "row" }, el("h2", {}, "Report"), el("a", { id: "report-link", target: "_blank", rel: "noopener" }, "in a page of its own")),
         el("iframe", { id: "report", title: "Report of the run" })))));
   form.make(runForm, (described) => {
@@ -67,6 +69,7 @@ export function make(place) {
     draw();
   });
   tried(form.refresh)();
+  addEventListener("target-changed", buttons);
   for (const event of ["resize", "themed"]) addEventListener(event, draw);
 }
 
@@ -77,25 +80,32 @@ const key = (ink, text) => {
   mark.style.background = `var(--${ink})`;
   return el("span", {}, mark, text);
 };
-const isOn = () => ["starting", "running", "stopping"].includes(state.phase);
+const isOn = () => ["starting", "ready", "running", "stopping"].includes(state.phase);
+const simulated = () => ["twin", "pil"].includes(byId("target").value) || byId("target").value.startsWith("replay:");
 
-function arm() { command({ do: "arm", wanted: !(state.armed_s > 0) }); }
+function arm() { command({ do: "arm", wanted: state.phase === "ready" || !(state.armed_s > 0) }); }
 function start() {
   command({ do: "start", order: form.order() });
   if (innerWidth <= 800) byId("live").scrollIntoView();
 }
 
 function buttons() {
-  const armed = state.armed_s > 0 && !isOn();
-  byId("arm").disabled = !who.operator || isOn();
-  byId("arm").textContent = armed ? "Armed – lay down" : "Arm";
+  // A simulated robot is armed before its start; a real one is found first, shown, and then armed.
+  const armed = state.armed_s > 0 && !isOn(), ready = state.phase === "ready", first = simulated();
+  byId("arm-title").textContent = first ? "2. Arm, then start" : "2. Connect, look, then arm";
+  byId("arm").disabled = !who.operator || !(ready || (first && !isOn()));
+  byId("arm").textContent = armed ? "Armed – lay down" : first ? "Arm" : "Arm: the robot moves";
   byId("arm").setAttribute("aria-pressed", String(armed));
-  byId("start").disabled = !who.operator || !armed;
-  const target = byId("target").value;
+  byId("arm").classList.toggle("main", ready);
+  byId("arm").style.order = first ? "0" : "2";
+  byId("start").textContent = first ? "Start" : "Connect";
+  byId("start").disabled = !who.operator || isOn() || (first && !armed);
   byId("arm-said").textContent = !who.operator ? "You watch. Everybody may press STOP; only the operator starts."
+    : ready ? "The robot is found and at rest. Is it where the picture shows it, and the floor clear? Arm moves it. STOP ends the run here."
     : isOn() ? "A run is on. STOP, or the space bar, stops the robot at any time."
       : armed ? "Armed for 30 s: Start will move the robot."
-        : `Is the floor clear? Arm, then Start; ${["twin", "pil"].includes(target) ? "on a simulated robot nothing real moves." : "the robot will move."}`;
+        : first ? "Arm, then Start; on a simulated robot nothing real moves."
+          : "Connect finds the robot and moves nothing; it is armed after that.";
   form.lock(isOn());
   byId("command").textContent = state.command ? `The same at a terminal: ${state.command}` : "";
 }
@@ -108,16 +118,24 @@ when("state", (message) => {
   if (state.armed_s > 0) armTimer = setTimeout(() => { state.armed_s = 0; buttons(); }, 1e3 * state.armed_s);
   if (state.run !== before.run || (state.phase === "starting" && before.phase !== "starting")) forget();
   if (state.begin?.floor) floor = state.begin.floor;
-  const words = { idle: "nothing runs", starting: "starting", running: "running", stopping: "stopping", ended: "ended" };
+  const words = { idle: "nothing runs", starting: "starting", ready: "found, not armed", running: "running", stopping: "stopping", ended: "ended" };
   byId("phase").textContent = words[state.phase];
-  byId("phase").className = `pill ${{ running: "good", stopping: "warn", starting: "warn" }[state.phase] || ""}`;
+  byId("phase").className = `pill ${{ running: "good", stopping: "warn", starting: "warn", ready: "warn" }[state.phase] || ""}`;
   outcome();
   buttons();
+  draw();
+});
+when("found", (found) => {
+  state.found = found;
+  if (state.phase !== "ready") return;
+  const [x, y, theta] = found.pose;
+  byId("pose").textContent = `robot found at x ${number(x, 3)} m, y ${number(y, 3)} m, heading ${number((theta * 180) / Math.PI, 1)}°; battery ${number(found.battery_v, 2)} V; firmware ${found.firmware}`;
   draw();
 });
 when("closed", () => { byId("phase").textContent = "no connection"; });
 when("history", (message) => {
   trail = message.trail;
+  trail.forEach(tune);
   requirements = message.requirements;
   fill(byId("events"));
   message.events.forEach(addEvent);
@@ -125,7 +143,7 @@ when("history", (message) => {
   draw();
 });
 when("live", (message) => {
-  for (const row of message.trail || []) trail.push(row);
+  for (const row of message.trail || []) { trail.push(row); tune(row); }
   if (trail.length > ROWS) trail = trail.filter((_, k) => k % 2 === 0 || k > trail.length - 300);
   (message.events || []).forEach(addEvent);
   if (message.now) now = message.now;
@@ -142,6 +160,8 @@ when("picture", async ({ seen, jpeg }) => {
   drawPicture(byId("picture"), bitmap, seen, floor.camera);
   byId("picture-said").textContent = seen.seen ? `robot seen at (${number(seen.x_m, 3)}, ${number(seen.y_m, 3)}) m, quality ${number(seen.quality)}` : "robot not seen";
 });
+
+const tune = (r) => tuning.took({ t: r[T], ex: r[DX], ey: r[DY], rx: r[RX], ry: r[RY] });
 
 function forget() {
   trail = []; sigma = null; requirements = []; now = null; shownReport = "";
@@ -203,7 +223,12 @@ function draw() {
 
 function paint() {
   drawn = false;
-  drawFloor(byId("floor"), floor, trail.map((r) => ({ x: r[X], y: r[Y], theta: r[TH], tx: r[TX] ?? NaN, ty: r[TY] ?? NaN, rx: r[RX], ry: r[RY] })), sigma);
-  const end = floor ? Math.max(floor.duration_s, trail.at(-1)?.[T] || 0) : 1;
-  for (const [id, , unit, lines] of CHARTS) drawChart(byId(`chart-${id}`), lines.map(([ink, , of, dash]) => ({ ink, dash, values: trail.map((r) => [r[T], of(r)]) })), end, unit);
+  const found = state.phase === "ready" && !trail.length && Number.isFinite(state.found?.pose?.[0]) ? state.found.pose : null;
+  const seen = found && floor ? { ...floor, start: found } : floor;
+  drawFloor(byId("floor"), seen, trail.map((r) => ({ x: r[X], y: r[Y], theta: r[TH], tx: r[TX] ?? NaN, ty: r[TY] ?? NaN, rx: r[RX], ry: r[RY] })), sigma);
+  const newest = trail.at(-1)?.[T] || 0, all = floor ? Math.max(floor.duration_s, newest) : 1;
+  // Of a long run the last half minute.
+  const end = all > LONG_S ? Math.max(newest, WINDOW_S) : all, begin = all > LONG_S ? end - WINDOW_S : 0;
+  tuning.paint();
+  for (const [id, , unit, lines] of CHARTS) drawChart(byId(`chart-${id}`), lines.map(([ink, , of, dash]) => ({ ink, dash, values: trail.filter((r) => r[T] >= begin).map((r) => [r[T], of(r)]) })), end, unit, begin);
 }

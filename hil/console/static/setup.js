@@ -1,11 +1,15 @@
 // The Set-up page: doctor, and a camera calibrated from given pictures: lens, floor, colours.
 import { ask, byId, el, fill, send, tried, whileBusy } from "./core.js";
+import * as bringup from "./bringup.js";
+import * as camera from "./camera.js";
 
 const clicks = { floor: [], colours: [] };
 
 export function make(place) {
   fill(place,
     el("div", { class: "card" }, el("div", { class: "row" }, el("h2", {}, "Doctor"), el("button", { id: "s-doctor", type: "button", on: { click: tried(doctor) } }, "Look at this machine")), el("div", { id: "s-doctor-said" })),
+    bringup.make(),
+    camera.make(refresh),
     el("div", { class: "card" }, el("h2", {}, "Camera, step 1: lens"),
       el("p", { class: "help" }, "10 to 30 pictures of a board held in all parts of the image, near and far, tilted by 20 to 40 degrees both ways. `hil calibrate board --out board.pdf` prints one."),
       pictures("lens", true),
@@ -23,6 +27,8 @@ export function make(place) {
       pictures("colours", false), clicked("colours", colourPoint), el("p", { id: "s-colours-points", role: "status" }),
       el("button", { id: "s-colours", type: "button", class: "main", on: { click: tried(colours) } }, "Learn the colours"), el("div", { id: "s-colours-said" })),
     el("div", { class: "card" }, el("h2", {}, "Camera file"), el("p", { class: "help", id: "s-file-said" }), el("pre", { id: "s-file", tabIndex: 0, hidden: true })));
+  tried(bringup.refresh)();
+  tried(camera.refresh)();
   for (const set of ["lens", "floor", "colours"]) tried(() => refresh(set))();
 }
 

@@ -70,6 +70,18 @@ def is_norm(cost: str) -> bool:
     return cost == "norm"
 
 
+def _block(gains: AsgIsmGains) -> control.AsgIsm:
+    return control.AsgIsm(
+        k=[gains.alpha_m_s3] * 2,
+        eps_min=[gains.eps_min_m_s2],
+        eps0=gains.eps0_m_s2,
+        beta=gains.beta,
+        mu0_s=gains.mu0_s,
+        sigma=gains.sigma_m_s2,
+        radial=is_norm(gains.cost),
+    )
+
+
 @OUTER_LAWS.register(
     "asg-ism",
     settings=AsgIsmGains,
@@ -88,23 +100,23 @@ class AsgIsm:
         self._chain = Chain(limits)
         self._t = 0.0
         self._delta4 = (0.0, 0.0)
-        self._block = control.AsgIsm(
-            k=[gains.alpha_m_s3] * 2,
-            eps_min=[gains.eps_min_m_s2],
-            eps0=gains.eps0_m_s2,
-            beta=gains.beta,
-            mu0_s=gains.mu0_s,
-            sigma=gains.sigma_m_s2,
-            radial=is_norm(gains.cost),
-        )
+        self._block = _block(gains)
+        self._anew = False  # the sliding stage starts with the next step
 
     def reset(self, reference: ReferenceState, estimate: Estimate) -> None:
         """Start anew: integrals to zero, gamma = -mu0 delta3(0) so that s(0) = 0."""
         begin(self._chain, reference, estimate, self._gains.zeta_start_m_s2)
         self._t = 0.0
+        self._anew = False
         self._delta4 = (0.0, 0.0)
         delta3, _ = self._backstep(reference, estimate, self._chain.state(estimate))
         self._block.reset(self._delta4, delta3)
+
+    def retune(self, gains: AsgIsmGains) -> None:
+        """Go on with other gains: the sliding stage starts anew from s = 0, delta4 and the chain stay."""
+        self._gains = gains
+        self._block = _block(gains)
+        self._anew = True
 
     @property
     def delta4_m_s(self) -> Vec2:
@@ -145,6 +157,9 @@ class AsgIsm:
         state = self._chain.state(estimate)
         (d3x, d3y), (jx, jy) = self._backstep(reference, estimate, state)
         d4x, d4y = self._delta4
+        if self._anew:
+            self._t, self._anew = 0.0, False
+            self._block.reset((d4x, d4y), (d3x, d3y))
         # (8.17), (8.20) corrected, with p = delta4 and q = delta3
         (sx, sy), kappa, psi, _, (eps, _) = self._block.terms(self._t, (d4x, d4y), (d3x, d3y))
         norm = math.hypot(sx, sy)

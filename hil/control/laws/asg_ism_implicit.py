@@ -70,6 +70,11 @@ class AsgIsmImplicit(StagedLaw):
     """The law; one instance runs one robot."""
 
     def _begin(self, delta3: Vec2, state: ChainState) -> None:  # noqa: ARG002 - of all laws
+        self._delta4 = (0.0, 0.0)
+        self._start(delta3)
+
+    def _start(self, delta3: Vec2) -> None:
+        """Start the sliding stage from s = 0."""
         gains = self._gains
         self._block = control.AsgIsm(
             k=[gains.alpha_m_s3] * 2,
@@ -78,13 +83,17 @@ class AsgIsmImplicit(StagedLaw):
             sigma=gains.sigma_m_s2,
             radial=is_norm(gains.cost),
         )
-        self._t = 0.0
+        self._t, self._anew = 0.0, False
         self._delta3 = delta3
-        self._delta4 = (0.0, 0.0)
         self._block.reset(self._delta4, delta3)
+
+    def _retuned(self) -> None:
+        self._anew = True
 
     def _wish(self, stage: Stage, state: ChainState, dt_s: float) -> Wish:  # noqa: ARG002 - of all laws
         gains = self._gains
+        if self._anew:
+            self._start(stage.delta3)
         self._delta3 = stage.delta3
         s, _, psi, dh, _ = self._block.terms(self._t, self._delta4, stage.delta3)
         mu, mu_next = 1.0 / (self._t + gains.mu0_s), 1.0 / (self._t + dt_s + gains.mu0_s)

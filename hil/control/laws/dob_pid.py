@@ -74,6 +74,12 @@ class DobPid:
         for axis, speed, accel in zip(self._axes, state.z2, state.z3, strict=True):
             axis.reset(speed, accel)
 
+    def retune(self, gains: DobPidGains) -> None:
+        """Go on with other gains; what was observed stays."""
+        self._gains = gains
+        for axis in self._axes:
+            axis.rate_s = gains.observer_s
+
     def step(self, reference: ReferenceState, estimate: Estimate, dt_s: float) -> OuterCommand:
         """Return the command for the next `dt_s`."""
         gains = self._gains
@@ -102,7 +108,7 @@ class Observer:
     """Speed, acceleration and disturbance of one world axis."""
 
     def __init__(self, rate_s: float) -> None:
-        self._rate = rate_s
+        self.rate_s = rate_s
         self.reset(0.0, 0.0)
 
     def reset(self, speed: float, accel: float) -> None:
@@ -111,7 +117,7 @@ class Observer:
 
     def see(self, speed: float, dt_s: float) -> None:
         """Take the speed measured at this tick."""
-        q = math.exp(-self._rate * dt_s)
+        q = math.exp(-self.rate_s * dt_s)
         miss, off = speed - self._speed, 1.0 - q
         self._speed += (1.0 - q * q * q) * miss
         self.accel += 1.5 * off * off * (1.0 + q) / dt_s * miss

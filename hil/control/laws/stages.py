@@ -140,6 +140,14 @@ class StagedLaw:
         self._advance(state, out, dt_s)
         return OuterCommand(out.eta1, out.w, make_trace(state, out, self._d0) | wish.terms)
 
+    def retune(self, gains: Any) -> None:
+        """Go on with other gains; whatever is integrated stays."""
+        self._gains = gains
+        self._retuned()
+
+    def _retuned(self) -> None:
+        """Work out anew what was made of the gains."""
+
     def _stage(self, reference: ReferenceState, estimate: Estimate, state: ChainState) -> Stage:
         gains = self._gains
         return backstep(

@@ -65,6 +65,12 @@ class StateFeedback:
         begin(self._chain, reference, estimate, self._gains.zeta_start_m_s2)
         self._integral = _ZERO
 
+    def retune(self, gains: PidGains) -> None:
+        """Go on with other gains; what the integral commands stays (with a gain of 0 it starts anew)."""
+        share = self._gains.ki_s4 / gains.ki_s4 if gains.ki_s4 else 0.0
+        self._integral = (self._integral[0] * share, self._integral[1] * share)
+        self._gains = gains
+
     def step(self, reference: ReferenceState, estimate: Estimate, dt_s: float) -> OuterCommand:
         """Return the command for the next `dt_s`."""
         gains, limits = self._gains, self._limits

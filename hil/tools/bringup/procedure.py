@@ -13,6 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
+from hil.config.control import OuterLimits
 from hil.core.errors import RigFault
 from hil.tools.bringup import floor_turn, measure, verdicts, wiring
 from hil.tools.bringup.drive import BoardStopped, OpenLoop
@@ -48,6 +49,14 @@ class Plan:
     turns: float = 10.0
     # Turn rate that the laws may ask for, where the robot stands on its floor; None: it is on blocks.
     floor_turn_rad_s: float | None = None
+
+
+def plan_for(robot: RobotConfig, turns: float, *, floor: bool) -> Plan:
+    """Return the plan for a robot on blocks, or on its floor, that the laws' limits ask for."""
+    limits = OuterLimits()
+    rim_m_s = limits.eta1_max_m_s + limits.theta_dot_max_rad_s * robot.track_m / 2.0
+    turn_rad_s = limits.theta_dot_max_rad_s if floor else None
+    return Plan(robot, rim_m_s / robot.wheel_radius_m, turns, turn_rad_s)
 
 
 class BringUp:
