@@ -69,12 +69,15 @@ def law_ran(columns: Columns) -> NDArray[np.bool_]:
 def disturbance(columns: Columns, who: str, d0_m: float) -> Array:
     """Return |C xi + D xi_dot| in m/s^3 at the ticks with the law running all around them.
 
-    `who` is the prefix of the columns of motion: "true" or "est". Empty below nine such ticks.
+    `who` is the prefix of the columns of motion: "true" or "est". Empty below nine such ticks, and
+    where most came at once, as on a host that is kept from running: there is no slope between those.
     """
     t_s = columns["t_s"]
     tick_s = float(np.median(np.diff(t_s)))
+    if tick_s <= 0.0 or not math.isfinite(d0_m):
+        return np.empty(0)
     half = max(round(HALF_SPAN_S / tick_s), 1)
-    if t_s.size <= 4 * half or not math.isfinite(d0_m):
+    if t_s.size <= 4 * half:
         return np.empty(0)
     eta1, w = columns[f"{who}_eta1_m_s"], columns[f"{who}_theta_dot_rad_s"]
     a1 = _slope(eta1, half, tick_s) - _mean_around(columns["zeta_m_s2"], half)
