@@ -71,7 +71,8 @@ def law_ran(columns: Columns) -> NDArray[np.bool_]:
 def disturbance(columns: Columns, who: str, d0_m: float) -> Array:
     """Return |C xi + D xi_dot| in m/s^3 at the ticks with the law running all around them.
 
-    `who` is the prefix of the columns of motion: "true" or "est". Empty below nine such ticks.
+    `who` is the prefix of the columns of motion: "true" or "est". Empty below nine such ticks, and
+    where most came at once, as on a host that is kept from running: there is no slope between those.
     """
     found = list(_disturbances(columns, who, d0_m))
     return np.concatenate(found) if found else np.empty(0)
@@ -80,8 +81,10 @@ def disturbance(columns: Columns, who: str, d0_m: float) -> Array:
 def _disturbances(columns: Columns, who: str, d0_m: float) -> Iterator[Array]:
     """Yield `disturbance` piece by piece."""
     tick_s = median(lambda: (np.diff(p["t_s"]) for p in pieces(columns, ["t_s"], before=1)))
+    if tick_s <= 0.0 or not math.isfinite(d0_m):
+        return
     half = max(round(HALF_SPAN_S / tick_s), 1)
-    if row_count(columns) <= 4 * half or not math.isfinite(d0_m):
+    if row_count(columns) <= 4 * half:
         return
     names = ["t_s", f"{who}_eta1_m_s", f"{who}_theta_dot_rad_s", *RESTING]
     for piece in pieces(columns, names, before=4 * half):

@@ -31,6 +31,8 @@ Columns = Mapping[str, "NDArray[np.float64]"]
 # never more than that at a time, or one column where somebody asks for it (an hour of 30 Hz: 0.9 MB).
 GROUP_ROWS = PIECE_ROWS
 _FORMAT = "hil-journal-1"
+# What a damaged Parquet file raises; ValueError for names that are no UTF-8.
+_UNREADABLE = (OSError, ValueError, pa.ArrowException)
 _MAX_HEADER = 65_536
 
 
@@ -157,7 +159,7 @@ def read_parquet(path: Path) -> Columns:
             return whole
         table = pq.read_table(path)
         return {name: _floats(table.column(name)) for name in table.column_names}
-    except (OSError, pa.ArrowException) as error:
+    except _UNREADABLE as error:
         raise _damaged(path, error) from None
 
 
@@ -167,7 +169,7 @@ def _floats(column: pa.ChunkedArray) -> NDArray[np.float64]:
 
 
 def _damaged(path: Path, error: Exception) -> BadInput:
-    first = str(error).splitlines()[0]
+    first = next(iter(str(error).splitlines()), type(error).__name__)
     return BadInput(f"{path}: damaged, not readable as Parquet: {first}")
 
 
@@ -187,7 +189,7 @@ class ColumnsOnDisk(Mapping[str, "NDArray[np.float64]"]):
         try:
             with pq.ParquetFile(self._path, pre_buffer=False) as file:
                 return _floats(file.read(columns=[name]).column(name))
-        except (OSError, pa.ArrowException) as error:
+        except _UNREADABLE as error:
             raise _damaged(self._path, error) from None
 
     def groups(self, names: Sequence[str]) -> Iterator[Columns]:

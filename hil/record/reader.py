@@ -244,7 +244,7 @@ def read_events(path: Path) -> tuple[Event, ...]:
         try:
             tree = json.loads(line)
             events.append(Event(float(tree["t_s"]), str(tree["kind"]), str(tree["text"])))
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, OverflowError):
             break
     return tuple(events)
 

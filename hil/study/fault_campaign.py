@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 import multiprocessing
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -11,10 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from hil.core.errors import BadInput
+from hil.core.registry import in_one_line
 from hil.study.fault_free import MOST_RATIO, fault_free, most_ratio
 from hil.study.fault_matrix import Cell, cells, run_cell
 
 CELLS, FAULT_FREE = "cells.jsonl", "fault_free.jsonl"
+ERROR = "error"  # outcome of a cell that is done again by the next call
 Key = tuple[str, str, str]
 
 
@@ -83,7 +86,13 @@ def run_fault_free(
 
 
 def _cell(key: tuple[str, str, str, int]) -> Cell:
-    return run_cell(*key)
+    """Run one cell; one that ends in an error of the harness is not met, and the others go on."""
+    try:
+        return run_cell(*key)
+    except Exception as error:
+        said = in_one_line(error)
+        fault, instant, law, _ = key
+        return Cell(fault, instant, law, ERROR, said, 0.0, 0.0, 0.0, math.nan, (f"error: {said}",))
 
 
 def _each(work: Callable[[Any], Any], items: Iterable[Any]) -> Iterable[Any]:
@@ -100,7 +109,7 @@ def _done(path: Path, seed: int) -> dict[Key, dict[str, Any]]:
     """Return the cells of an earlier call of this seed."""
     found: dict[Key, dict[str, Any]] = {}
     for tree in _lines(path, ("seed", "fault", "instant", "law")):
-        if tree.pop("seed") == seed:
+        if tree.pop("seed") == seed and tree.get("outcome") != ERROR:
             found[(tree["fault"], tree["instant"], tree["law"])] = tree
     return found
 

@@ -74,7 +74,10 @@ def read_file(path: Path) -> dict[str, float]:
         isinstance(value, int | float) for value in table.values()
     ):
         raise BadInput(f"{path}: has no table [board] of NAME = number")
-    values = {name: float(value) for name, value in table.items()}
+    try:
+        values = {name: float(value) for name, value in table.items()}
+    except OverflowError:  # TOML's integers have no end
+        raise BadInput(f"{path}: [board] has a number beyond what any parameter takes") from None
     check_board(values)
     return values
 

@@ -15,6 +15,7 @@ import socket
 import time
 import tty
 from collections import deque
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,7 +27,7 @@ from hil.wire import dialect
 from hil.wire.framing import FrameReader
 
 if TYPE_CHECKING:
-    from hil.core.rig import Rig
+    from hil.core.rig import Frame, Rig
 
 # The twin's events are looked for this often; bytes and frames are late by no more.
 _STEP_S = 0.001
@@ -135,11 +136,38 @@ class FrameServer:
         release_socket(self._path, self._identity)
 
 
-class TwinServer:
-    """Lets a simulated rig follow this machine's clock and passes its bytes and frames on.
+@dataclass(slots=True)
+class FollowedClock:
+    """The twin's time, which follows this machine's and stands still while the server is held up for long.
 
-    `worst_lag_s` is the most the twin was behind, `slipped_s` what its clock was put back for good.
+    `ahead_s` is the twin's time less this machine's, `worst_lag_s` the most the twin was behind,
+    `slipped_s` what it was put back for good.
     """
+
+    ahead_s: float
+    worst_lag_s: float = 0.0
+    slipped_s: float = 0.0
+
+    def follow(self, now_s: float, rig_s: float) -> float:
+        """Return the time to which the twin is to move from `rig_s`, at `now_s` on this machine."""
+        lag_s = now_s + self.ahead_s - rig_s
+        self.worst_lag_s = max(self.worst_lag_s, lag_s)
+        if lag_s > _SLIP_S:
+            self.ahead_s -= lag_s - _STEP_S
+            self.slipped_s += lag_s - _STEP_S
+        return now_s + self.ahead_s
+
+    def stamped(self, frame: Frame) -> Frame:
+        """Return a frame as a camera stamps it whose clock went on meanwhile.
+
+        Without, frames would look late by what was missed: nothing in their times tells a clock that
+        stood still from frames held up, and those keep the dates they have.
+        """
+        return replace(frame, t_cam_s=frame.t_cam_s + self.slipped_s) if self.slipped_s else frame
+
+
+class TwinServer:
+    """Lets a simulated rig follow this machine's clock and passes its bytes and frames on."""
 
     def __init__(self, rig: Rig, pty: Path, frames: Path) -> None:
         self._rig = rig
@@ -153,19 +181,23 @@ class TwinServer:
         self._listening = False
         self._watcher = FrameReader()
         self._armed = False
-        self.worst_lag_s = 0.0
-        self.slipped_s = 0.0
+        self._clock = FollowedClock(rig.now_s() - time.monotonic())
+
+    @property
+    def worst_lag_s(self) -> float:
+        """The most the twin was behind."""
+        return self._clock.worst_lag_s
+
+    @property
+    def slipped_s(self) -> float:
+        """What the twin's clock was put back for good."""
+        return self._clock.slipped_s
 
     def run(self, until_s: float) -> None:
         """Serve until this machine's monotonic clock shows `until_s`."""
-        ahead_s = self._rig.now_s() - time.monotonic()
+        self._clock.ahead_s = self._rig.now_s() - time.monotonic()
         while (now_s := time.monotonic()) < until_s:
-            lag_s = now_s + ahead_s - self._rig.now_s()
-            self.worst_lag_s = max(self.worst_lag_s, lag_s)
-            if lag_s > _SLIP_S:
-                ahead_s -= lag_s - _STEP_S
-                self.slipped_s += lag_s - _STEP_S
-            self._follow(now_s + ahead_s)
+            self._follow(self._clock.follow(now_s, self._rig.now_s()))
             self._listen()
             for key, _ in self._selector.select(_STEP_S):
                 key.data()
@@ -179,7 +211,7 @@ class TwinServer:
                 self.port.write(data)
             while (frame := self._rig.poll_frame()) is not None:
                 if self._camera.wanted:
-                    self._camera.send(encode_frame(frame))
+                    self._camera.send(encode_frame(self._clock.stamped(frame)))
         self._camera.flush()
 
     def _room_bytes(self) -> int:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -19,7 +21,7 @@ from hil.record.reader import RunRecord
 from hil.runs._native import Plausibility
 from hil.runs.execute import RunSpec, execute_in_memory
 from hil.runs.watching import picture_of, stops
-from hil.study.fault_campaign import finished_free, run_fault_free
+from hil.study.fault_campaign import finished, finished_free, run_fault_free, run_matrix
 from hil.study.fault_free import fault_free, most_ratio
 from hil.study.fault_matrix import run_cell
 
@@ -224,3 +226,25 @@ def test_the_command_keeps_what_it_had(tmp_path: Path) -> None:
         runner.invoke(
             cli, ["faults", "--fault", "no"], catch_exceptions=False, standalone_mode=False
         )
+
+
+def test_a_cell_that_raises_is_not_met_and_done_again(tmp_path: Path) -> None:
+    """An error of the harness ends its cell and not the campaign."""
+    keys = [("link cut", "closing", "pid"), ("no such fault", "at speed", "pid")]
+    told: list[tuple[int, int]] = []
+    cells = run_matrix(keys, 1, tmp_path, lambda done, count: told.append((done, count)))
+    assert [cell["met"] for cell in cells] == [True, False]
+    assert cells[1]["flaws"] == ("error: StopIteration",)
+    assert told[-1] == (2, 2)
+    assert finished(tmp_path, 1) == keys[:1]
+
+
+def test_a_host_kept_from_running_has_figures() -> None:
+    """Most of its ticks come at once: no slope is taken between those, and the verdict stands."""
+    record = run("scenario-1", ["duration_s=3", fault("host_overloaded", start_s=0.0)], "asg-ism")
+    steps_s = np.diff(record.samples["t_s"])
+    assert np.median(steps_s) == 0.0
+    figures = record.figures().values
+    assert math.isnan(figures["disturbance_90_m_s3"])
+    assert figures["law_ticks"] > 60
+    assert record.verdicts()

@@ -73,7 +73,7 @@ def test_killed_politely_both_ends_leave_as_by_ctrl_c(tmp_path, number):
         run = subprocess.Popen(
             [
                 *HIL, "run", "scenario-1", "--on", f"serial:{port}", "--camera", f"twin:{frames}",
-                "--set", "duration_s=40", "--set", "safety.pose_lost_s=5", "--out", str(folder),
+                "--set", "duration_s=40", "--out", str(folder),
             ],
             stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip

@@ -125,7 +125,7 @@ class ResultStore:
                 return None
         found = self._schema.metadata[_DIGEST].decode() if path.exists() else None
         for file in self._files():
-            with suppress(OSError, pa.ArrowException, KeyError):
+            with suppress(OSError, pa.ArrowException, KeyError, ValueError):
                 found = str((pq.read_schema(file).metadata or {})[_DIGEST], "ascii")
         if found is not None:
             self.notes.append(f"{path}: damaged or lost, made anew")
