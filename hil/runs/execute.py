@@ -17,7 +17,9 @@ from hil.config.fit import check_fit
 from hil.config.limits import check_edges, wheel_speed_max_rad_s
 from hil.config.robot import BUILT_IN_PLANT
 from hil.control.estimators.making import make_estimator
+from hil.control.laws.axes import in_axes
 from hil.control.laws.hold import HoldAtGoal
+from hil.control.laws.let_go import LetGo
 from hil.control.laws.making import make_outer_law
 from hil.control.laws.turn_first import TurnFirst
 from hil.control.laws.within import WithinWheelSpeed
@@ -49,6 +51,7 @@ from vision.spread import spread
 if TYPE_CHECKING:
     from hil.config.camera import CameraConfig
     from hil.config.scenario import Scenario
+    from hil.control.vehicles.vehicle import Vehicle
     from hil.core.registry import Entry
     from hil.core.rig import Rig
     from hil.core.types import OuterLaw, Pose, PoseMeasurement
@@ -269,16 +272,22 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
         camera_clock=CameraClock(scenario.camera.latency_s),
         localiser=_localiser_of(spec),
         estimator=make_estimator(control.estimator, control, vehicle.geometry),
-        law=TurnFirst(
-            WithinWheelSpeed(law or make_law(spec), vehicle, wheel_speed_max_rad_s(scenario)),
-            control.limits.turn_missing_rad_s,
-        ),
+        law=_limited(law or make_law(spec), vehicle, scenario),
         reference=make_reference(scenario.reference),
         vehicle=vehicle,
         recorder=recorder,
         timeline=timeline,
         own_terms=tuple(OUTER_LAWS.get(spec.outer).trace),
     )
+
+
+def _limited(law: OuterLaw, vehicle: Vehicle, scenario: Scenario) -> OuterLaw:
+    """Return the law in its axes, under what holds for every law."""
+    limits = scenario.control.limits
+    law = in_axes(law, scenario.control.axes_rad)
+    law = WithinWheelSpeed(law, vehicle, wheel_speed_max_rad_s(scenario))
+    law = TurnFirst(law, limits.turn_missing_rad_s)
+    return LetGo(law, vehicle, limits.let_go_rad_s)
 
 
 class _WhenAsked:

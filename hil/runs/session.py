@@ -349,8 +349,12 @@ class Session:
         self._supervisor.check_estimate(estimate)
         link = self._parts.link
         most_counts = link.info.pwm_top_counts * link.parameters.get("PWM_MAX", 1.0)
+        stall_counts = link.info.pwm_top_counts * link.parameters.get("STALL_DUTY", 1.0)
         sides = self._limits.sides(self._report, self._wheels_asked, most_counts)
-        return estimate if sides == (0, 0) else replace(estimate, sides_at_limit=sides)
+        hard = self._limits.driven_hard(self._report, stall_counts)
+        if sides == (0, 0) and not hard:
+            return estimate
+        return replace(estimate, sides_at_limit=sides, driven_hard=hard)
 
     # -- out -----------------------------------------------------------------------------------
 

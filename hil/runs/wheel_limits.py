@@ -38,6 +38,14 @@ class WheelLimits:
         right = _side(wire.pwm_right_counts, asked_rad_s[1] - wire.omega_right_rad_s, most_counts)
         return (left, right)
 
+    @staticmethod
+    def driven_hard(report: WheelReport | None, stall_counts: float) -> bool:
+        """Say whether a side is driven with what the board would call a stall if its wheel stood."""
+        if report is None:
+            return False
+        wire = report.wire
+        return max(abs(wire.pwm_left_counts), abs(wire.pwm_right_counts)) >= stall_counts > 0.0
+
     def take(
         self, sides: tuple[int, int], asked_rad_s: float, made_rad_s: float, dt_s: float
     ) -> None:
