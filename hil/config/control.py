@@ -63,6 +63,13 @@ class OuterLimits(Section):
         gt=0,
         le=20,
     )
+    let_go_rad_s: float | None = quantity(
+        "rad/s",
+        "wheel speed up to which a side driven with STALL_DUTY is let go; none: never",
+        0.5,
+        gt=0,
+        le=20,
+    )
     lead_s: float = quantity(
         "s", "lead of set-points; half the wheel lag, as noise grows", 0.03, ge=0, le=0.5
     )
@@ -205,6 +212,9 @@ class ControlConfig(Section):
 
     rate_hz: float = quantity("Hz", "outer tick; the camera's rate", 30.0, ge=1, le=200)
     outer: OuterLawName = Field("asg-ism", description="outer law")
+    axes_rad: float = quantity(
+        "rad", "turn of the world axes in which the law works", 0.0, ge=-3.15, le=3.15
+    )
     estimator: EstimatorName = Field("fused", description="state estimator")
     estimator_settings: SerializeAsAny[BaseModel] = Field(
         default_factory=dict, validate_default=True, description="values of the estimator's own"

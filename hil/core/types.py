@@ -83,7 +83,8 @@ class Estimate:
     `z1`, `z2` are the flat output (2.35) and its rate in world axes. `z3` is given only by an
     estimator that observes acceleration; None means the law forms it from its own zeta.
     `sides_at_limit` (left, right) is 1 or -1 for a side whose motor gives all it can forward or
-    backward and lacks speed; the harness fills it in from what the board reports.
+    backward and lacks speed; `driven_hard` says that a side is driven with a duty with which a wheel
+    that stands is a stall. The harness fills both in from what the board reports.
     """
 
     t_host_s: float
@@ -94,6 +95,7 @@ class Estimate:
     z2_m_s: Vec2
     z3_m_s2: Vec2 | None = None
     sides_at_limit: tuple[int, int] = (0, 0)
+    driven_hard: bool = False
 
 
 @dataclass(frozen=True, slots=True)

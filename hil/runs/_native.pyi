@@ -16,6 +16,9 @@ HEARD: int
 TAKEN: int
 
 def side_at_limit(pwm_counts: float, lacks_rad_s: float, most_counts: float) -> int: ...
+def driven_hard(
+    left_pwm_counts: float, right_pwm_counts: float, stall_counts: float
+) -> bool: ...
 def odd_stamp(ahead_s: float) -> str:
     """Return why a frame is not looked at whose exposure would lie `ahead_s` after its arrival."""
 
@@ -88,6 +91,9 @@ class Watch:
         """Raise RigFault when link or camera no longer answer for the robot, or the wheels turn wrongly."""
 
     def sides(self, most_counts: float) -> tuple[int, int]: ...
+    def driven_hard(self, stall_counts: float) -> bool:
+        """Say whether a side is driven with what the board would call a stall if its wheel stood."""
+
     def take_tick(
         self,
         now_s: float,

@@ -17,7 +17,9 @@ from hil.config.fit import check_fit
 from hil.config.limits import check_edges, wheel_speed_max_rad_s
 from hil.config.robot import BUILT_IN_PLANT
 from hil.control.estimators.making import make_estimator
+from hil.control.laws.axes import in_axes
 from hil.control.laws.hold import HoldAtGoal
+from hil.control.laws.let_go import LetGo
 from hil.control.laws.turn_first import TurnFirst
 from hil.control.laws.within import WithinWheelSpeed
 from hil.control.references import make_reference
@@ -57,6 +59,7 @@ from vision.looking import looker
 if TYPE_CHECKING:
     from hil.config.camera import CameraConfig
     from hil.config.scenario import Scenario
+    from hil.control.vehicles.vehicle import Vehicle
     from hil.core.registry import Entry
     from hil.core.rig import Picture, Rig
     from hil.core.types import OuterLaw, Pose, PoseMeasurement
@@ -295,10 +298,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw | None 
         camera_clock=CameraClock(scenario.camera.latency_s),
         localiser=_localiser_of(spec),
         estimator=make_estimator(control.estimator, control, vehicle.geometry),
-        law=TurnFirst(
-            WithinWheelSpeed(law or make_law(spec), vehicle, wheel_speed_max_rad_s(scenario)),
-            control.limits.turn_missing_rad_s,
-        ),
+        law=_limited(law or make_law(spec), vehicle, scenario),
         reference=make_reference(scenario.reference),
         vehicle=vehicle,
         recorder=recorder,
@@ -320,6 +320,15 @@ def make_ordered_parts(
     own = None if keep_gains else law
     orders = OperatorOrders(source, parts.link, parts.timeline, goal, own)
     return replace(parts, orders=orders, reference=goal)
+
+
+def _limited(law: OuterLaw, vehicle: Vehicle, scenario: Scenario) -> OuterLaw:
+    """Return the law in its axes, under what holds for every law."""
+    limits = scenario.control.limits
+    law = in_axes(law, scenario.control.axes_rad)
+    law = WithinWheelSpeed(law, vehicle, wheel_speed_max_rad_s(scenario))
+    law = TurnFirst(law, limits.turn_missing_rad_s)
+    return LetGo(law, vehicle, limits.let_go_rad_s)
 
 
 class _WhenAsked:

@@ -266,8 +266,11 @@ class Session:
         self._watch.check_estimate(estimate.pose.x_m, estimate.pose.y_m)
         link = self._parts.link
         most_counts = link.info.pwm_top_counts * link.parameters.get("PWM_MAX", 1.0)
-        sides = self._watch.sides(most_counts)
-        return estimate if sides == (0, 0) else replace(estimate, sides_at_limit=sides)
+        stall_counts = link.info.pwm_top_counts * link.parameters.get("STALL_DUTY", 1.0)
+        sides, hard = self._watch.sides(most_counts), self._watch.driven_hard(stall_counts)
+        if sides == (0, 0) and not hard:
+            return estimate
+        return replace(estimate, sides_at_limit=sides, driven_hard=hard)
 
     # -- out -----------------------------------------------------------------------------------
 

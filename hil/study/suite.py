@@ -23,6 +23,7 @@ from hil.config.deck import CALM, Cell, Deck
 from hil.core.errors import BadInput
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import BUILT_IN
+from hil.study.directions import in_drawn_axes
 from hil.study.parts_off import run_without
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ class OnSuite:
 
     def __call__(self, job: Job) -> Figures:
         """Return the figures of one run."""
-        scenario = with_gains(self.scenarios[job.cell], job.gains)
+        scenario = with_gains(in_drawn_axes(self.scenarios[job.cell], job.cell), job.gains)
         values = run_without(scenario, job.outer, job.seed, job.without)
         return {name: values[name] for name in KEPT} if values else {}
 

@@ -24,6 +24,7 @@ from hil.core.registries import OUTER_LAWS
 from hil.core.registry import Box
 from hil.core.types import wrap_pi
 from hil.study.costs import USUAL, Cost, Figures
+from hil.study.directions import in_drawn_axes
 
 if TYPE_CHECKING:
     from hil.config.gains import Gains
@@ -357,7 +358,10 @@ class OnTarget:
         from hil.runs.execute import RunSpec, execute_in_memory  # noqa: PLC0415 - the search needs no target
 
         spec = RunSpec(
-            scenario=case_scenario(trial.case, trial.gains, self.tasks.get(trial.case.scenario)),
+            scenario=in_drawn_axes(
+                case_scenario(trial.case, trial.gains, self.tasks.get(trial.case.scenario)),
+                f"{trial.case}, seed {trial.seed}",
+            ),
             target=self.target,
             camera=self.camera,
             outer=trial.outer,

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from hil.config.control import ControlConfig
 from hil.config.deck import load_deck
+from hil.control.laws.axes import drawn_axes_rad
 from hil.core.registries import OUTER_LAWS
 from hil.study.ablation import ablate
 from hil.study.front_search import Front, search_front, single_best
@@ -144,6 +145,7 @@ def verdict_data(
         "laws": list(field.laws),
         "search_cells": list(field.search),
         "unseen_cells": list(field.unseen),
+        "axes_rad": {cell: round(drawn_axes_rad(cell), 4) for cell in field.unseen},
         "yardstick": {task: dict(figures) for task, figures in yard.figures.items()},
         "fronts": [],
         "shipped": {},

@@ -143,6 +143,7 @@ void bind_plausibility(nb::module_& m) {
       .def("check_progress", &Plausibility::check_progress, "now_s"_a, "error_m"_a)
       .def("finish", &Plausibility::finish);
   m.def("side_at_limit", &WheelLimits::side, "pwm_counts"_a, "lacks_rad_s"_a, "most_counts"_a);
+  m.def("driven_hard", &WheelLimits::driven_hard, "left_pwm_counts"_a, "right_pwm_counts"_a, "stall_counts"_a);
   m.def("odd_stamp", &runs::odd_stamp, "ahead_s"_a);
   nb::class_<RowFormat>(m, "RowFormat")
       .def(
@@ -206,6 +207,7 @@ void bind_watch(nb::module_& m) {
             return nb::make_tuple(sides[0], sides[1]);
           },
           "most_counts"_a)
+      .def("driven_hard", &Watch::driven_hard, "stall_counts"_a)
       .def(
           "take_tick",
           [](Watch& w, double now_s, double dt_s, const std::array<int, 2>& sides, double asked_rad_s,

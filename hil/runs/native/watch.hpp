@@ -81,6 +81,12 @@ class Watch {
             WheelLimits::side(w.pwm_right_counts, asked[1] - w.omega_right_rad_s, most_counts)};
   }
 
+  // Whether a side is driven with what the board would call a stall if its wheel stood.
+  bool driven_hard(double stall_counts) const {
+    const mavlink_wheel_state_t& w = report.wire;
+    return has_report && WheelLimits::driven_hard(w.pwm_left_counts, w.pwm_right_counts, stall_counts);
+  }
+
   // Takes what a tick asked of the wheels, and how it stood with the goal.
   void take_tick(double now_s, double dt_s, const std::array<int, 2>& sides, const Command& command,
                  double theta_dot_rad_s, double error_m) {
