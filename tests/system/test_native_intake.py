@@ -1,5 +1,8 @@
-"""The two ways in which a run takes in what arrives give the same run: from arrival to arrival in native code,
-and step by step in Python (which every other rig, estimator and record needs)."""
+"""The two ways in which a run takes in what arrives give the same run to the bit.
+
+From arrival to arrival in native code; or step by step in Python, which every other rig, estimator and
+record needs.
+"""
 
 import gc
 import math
