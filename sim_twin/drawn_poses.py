@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from importlib.resources import files
 from random import Random
 from typing import TYPE_CHECKING
@@ -34,6 +35,7 @@ class LocaliserError(Section):
     quality_ratio: float = Field(ge=0, le=1)
 
 
+@cache
 def load_localiser_error() -> LocaliserError:
     """Return the statistics that ship with the twin."""
     text = (files("hil") / "data" / "localiser_error.toml").read_text(encoding="utf-8")

@@ -220,6 +220,9 @@ class Twin:
         """Return the handle by which native code drives this rig, None where it needs Python code."""
         if self._maker is not None or self._outside is not None or self._host.any:
             return None
+        own = (getattr(type(self), name) is method for name, method in _OWN.items())
+        if type(self.stream) is not TwinStream or not all(own):
+            return None  # a rig that does one of these in its own way is asked
         two_sided = getattr(type(self._vehicle), "flat_output", None) is TwoSided.flat_output
         return self._eye.handle() if two_sided else None
 
@@ -257,6 +260,10 @@ class Twin:
             channel.swaps = spans("link_reordered")
         self._pictures.begin(lambda fault: _span(fault, t_begin_s))
         self._host.begin(lambda fault: _span(fault, t_begin_s))
+
+
+# What native code does in place of these.
+_OWN = {name: getattr(Twin, name) for name in ("now_s", "wait", "poll_frame", "truth")}
 
 
 def _covered_maker(setup: TwinSetup) -> FrameMaker:

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 def true_robot(scenario: Scenario) -> RobotConfig:
     """Return the robot as it really is: the believed one with the scenario's mismatch applied."""
+    if not scenario.mismatch:
+        return scenario.robot
     tree = scenario.robot.model_dump()
     for key, ratio in scenario.mismatch.items():
         *path, leaf = key.split(".")

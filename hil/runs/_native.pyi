@@ -140,15 +140,25 @@ class Pump:
     def others(self) -> list[tuple[int, bytes]]: ...
     def frame_rows(self, origin_s: float) -> list[tuple[float, ...]]: ...
     def check(self, watch: Watch, now_s: float, pwm_top_counts: int) -> None: ...
-    def row(
+    rig_now_s: float
+    def look(
+        self, watch: Watch, now_s: float, most_counts: float, stall_counts: float
+    ) -> Estimate:
+        """Return the state at the actuation time of a tick, inside the fence; else raise RigFault."""
+
+    def act(
         self,
         watch: Watch,
         format: RowFormat,
         now_s: float,
         t_s: float,
+        dt_s: float,
+        looked_goal_m: Vec2,
         goal_m: Vec2,
         command: OuterCommand,
         wheels_rad_s: Vec2,
         late: bool,
-    ) -> tuple[float, ...]: ...
+    ) -> tuple[float, ...]:
+        """Send what a tick asks of the wheels, tell everyone of it, and return its row."""
+
     def send_setpoint(self, t_s: float, left_rad_s: float, right_rad_s: float) -> None: ...

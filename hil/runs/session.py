@@ -23,7 +23,7 @@ from hil.wire import handshake
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
-    from hil.core.types import Estimate, OuterCommand
+    from hil.core.types import Estimate, OuterCommand, ReferenceState
 
 # Poses and time exchanges wanted before the start; both ties are then good to a few ms.
 _POSES_WANTED = 15
@@ -177,25 +177,15 @@ class Session:
             self._intake.until(due_s)
             now_s = rig.now_s()
             self._check_safety(now_s)
-            estimate = self._estimate(now_s + self._watch.uplink_s)
+            estimate = self._estimate(now_s)
             reference = self._parts.reference.at(estimate.t_host_s - self._t0_s)
             yield Situation(now_s - self._t0_s, reference, estimate)
             if tick == 0:
                 law.reset(reference, estimate)
             self._parts.orders.at_tick(reference, estimate)
             command = law.step(reference, estimate, period_s)
-            left, right = wheels = self._command_wheels(now_s, command)
-            self._watch.take_tick(
-                now_s,
-                period_s,
-                estimate.sides_at_limit,
-                command.theta_dot_rad_s,
-                estimate.theta_dot_rad_s,
-                left,
-                right,
-                math.dist(reference.z1_m, estimate.z1_m),
-            )
-            self._record(now_s, command, wheels, now_s - due_s > _LATE_RATIO * period_s)
+            late = now_s - due_s > _LATE_RATIO * period_s
+            self._act(now_s, period_s, reference, estimate, command, late)
             if self._publish is not None:
                 self._publish(now_s, estimate, self._parts.link.armed)
             if self._progress is not None:
@@ -258,29 +248,72 @@ class Session:
             now_s, estimator.agreement_age_s(now_s), estimator.refused, estimator.scales, top_counts
         )
 
-    def _estimate(self, t_effect_s: float) -> Estimate:
-        """Return the state at the actuation time, inside the fence; else RigFault."""
-        estimate = self._parts.estimator.estimate_at(t_effect_s)
-        if estimate is None:
-            raise RigFault("camera: no pose to estimate from")
-        self._watch.check_estimate(estimate.pose.x_m, estimate.pose.y_m)
-        link = self._parts.link
+    def _estimate(self, now_s: float) -> Estimate:
+        """Return the state at the actuation time of a tick, inside the fence; else RigFault."""
+        link, watch = self._parts.link, self._watch
         most_counts = link.info.pwm_top_counts * link.parameters.get("PWM_MAX", 1.0)
         stall_counts = link.info.pwm_top_counts * link.parameters.get("STALL_DUTY", 1.0)
-        sides, hard = self._watch.sides(most_counts), self._watch.driven_hard(stall_counts)
+        if self._pump is not None:
+            return self._pump.look(watch, now_s, most_counts, stall_counts)
+        estimate = self._parts.estimator.estimate_at(now_s + watch.uplink_s)
+        if estimate is None:
+            raise RigFault("camera: no pose to estimate from")
+        watch.check_estimate(estimate.pose.x_m, estimate.pose.y_m)
+        sides, hard = watch.sides(most_counts), watch.driven_hard(stall_counts)
         if sides == (0, 0) and not hard:
             return estimate
         return replace(estimate, sides_at_limit=sides, driven_hard=hard)
 
     # -- out -----------------------------------------------------------------------------------
 
-    def _command_wheels(self, now_s: float, command: OuterCommand) -> tuple[float, float]:
-        left, right = self._parts.vehicle.wheels(command.eta1_m_s, command.theta_dot_rad_s)
+    def _act(
+        self,
+        now_s: float,
+        period_s: float,
+        reference: ReferenceState,
+        estimate: Estimate,
+        command: OuterCommand,
+        late: bool,
+    ) -> None:
+        """Send what a tick asks of the wheels, tell estimator and judges of it, and record its row.
+
+        Estimate, truth and goal of the row are those of `now_s`.
+        """
+        parts, watch, t_s = self._parts, self._watch, now_s - self._t0_s
+        turn_rad_s = command.theta_dot_rad_s
+        left, right = wheels = parts.vehicle.wheels(command.eta1_m_s, turn_rad_s)
+        goal_m, aim_m = parts.reference.at(t_s).z1_m, reference.z1_m
+        if self._pump is not None:
+            row = self._pump.act(
+                watch, self._format, now_s, t_s, period_s, aim_m, goal_m, command, wheels, late
+            )
+            parts.recorder.append(row)
+            return
         self._send_wheels(left, right)
-        self._parts.estimator.on_command(
-            now_s + self._watch.uplink_s, command.eta1_m_s, command.theta_dot_rad_s
+        parts.estimator.on_command(now_s + watch.uplink_s, command.eta1_m_s, turn_rad_s)
+        watch.take_tick(
+            now_s,
+            period_s,
+            estimate.sides_at_limit,
+            turn_rad_s,
+            estimate.theta_dot_rad_s,
+            left,
+            right,
+            math.dist(aim_m, estimate.z1_m),
         )
-        return left, right
+        row = watch.row(
+            self._format,
+            parts.link.native,
+            now_s,
+            t_s,
+            parts.estimator.estimate_at(now_s),
+            parts.rig.truth(),
+            goal_m,
+            command,
+            wheels,
+            late,
+        )
+        parts.recorder.append(row)
 
     def _send_wheels(self, left_rad_s: float, right_rad_s: float) -> None:
         now_s = self._parts.rig.now_s()
@@ -288,28 +321,3 @@ class Session:
             self._pump.send_setpoint(now_s, left_rad_s, right_rad_s)
         else:
             self._parts.link.send_setpoint(now_s, left_rad_s, right_rad_s)
-
-    def _record(
-        self, now_s: float, command: OuterCommand, wheels: tuple[float, float], late: bool
-    ) -> None:
-        """Append the row of this tick; estimate, truth and reference are those of `now_s`."""
-        parts, t_s = self._parts, now_s - self._t0_s
-        goal_m = parts.reference.at(t_s).z1_m
-        if self._pump is not None:
-            row = self._pump.row(
-                self._watch, self._format, now_s, t_s, goal_m, command, wheels, late
-            )
-        else:
-            row = self._watch.row(
-                self._format,
-                parts.link.native,
-                now_s,
-                t_s,
-                parts.estimator.estimate_at(now_s),
-                parts.rig.truth(),
-                goal_m,
-                command,
-                wheels,
-                late,
-            )
-        parts.recorder.append(row)

@@ -20,6 +20,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from hil.control.estimators.fused import Fused
+from hil.control.vehicles.vehicle import TwoSided
 from hil.core.rig import whole
 from hil.record.memory import MemoryRecorder
 from hil.runs import _native
@@ -62,7 +63,8 @@ def make_watch(scenario: Scenario, parts: Parts, note: Note) -> _native.Watch:
 def make_pump(parts: Parts, watch: _native.Watch, note: Note) -> _native.Pump | None:
     """Return what takes bytes and frames in without a step into Python; None where somebody asks for them.
 
-    It needs a simulated rig that gives poses, the default estimator itself, and a record in memory.
+    It needs a simulated rig that gives poses, the default estimator itself, wheels as that believes them to
+    be, and a record in memory.
     """
     handle = getattr(parts.rig, "native", None)
     sink = parts.recorder
@@ -71,7 +73,8 @@ def make_pump(parts: Parts, watch: _native.Watch, note: Note) -> _native.Pump | 
     if type(sink) is not MemoryRecorder or sink.keep_link:
         return None
     rig = handle()
-    if rig is None:
+    two_sided = getattr(type(parts.vehicle), "wheels", None) is TwoSided.wheels
+    if rig is None or not two_sided:
         return None
     return _native.Pump(rig, parts.link.native, parts.camera_clock, parts.estimator, watch, note)
 

@@ -18,12 +18,15 @@ import pyarrow.parquet as pq
 import pytest
 
 from hil.core.errors import BadInput
+from hil.core.types import OuterCommand
 from hil.record.layout import FRAMES_JOURNAL, SAMPLES_JOURNAL
 from hil.record.manifest import read_manifest
 from hil.record.reader import picture_name, read_pictures, read_run
 from hil.record.recorder import Recorder
-from hil.record.schema import FRAME_NAMES, SAMPLE_COLUMNS, SAMPLE_NAMES, trace_row
+from hil.record.schema import FRAME_NAMES, SAMPLE_COLUMNS, SAMPLE_NAMES, TRACE_KEYS
 from hil.record.tick_rows import COVARIANCE
+from hil.runs._native import REACTIONS, RowFormat, Watch
+from hil.wire._wire import Link
 from tests.record.synthetic import frame_row, image_of, make_run, manifest, rows
 
 
@@ -298,12 +301,34 @@ def test_no_picture_is_taken_for_an_option(tmp_path, t_s):
 
 def test_trace_of_a_law_fills_its_columns():
     """Terms land in their columns by name; a law without sliding variables leaves NaN."""
-    row = trace_row({"s_x": 1.0, "zeta_m_s2": 2.0, "in_layer": True})
-    named = dict(zip([c.name for c in SAMPLE_COLUMNS if c.trace_key], row, strict=True))
-    assert named["s_x_m_s2"] == 1.0
-    assert named["zeta_m_s2"] == 2.0
-    assert named["in_layer"] is True
-    assert math.isnan(named["s_y_m_s2"])
+    watch = Watch(
+        fence_m=(-1, 1, -1, 1), link_lost_s=1, pose_lost_s=1, stops=[True] * len(REACTIONS),
+        note=lambda *_: None, uplink_s=0.0, rad_per_count=0.01,
+    )  # fmt: skip
+    trace = {"s_x": 1.0, "zeta_m_s2": 2.0, "in_layer": True, "own": 3.0}
+    command = OuterCommand(0.25, 0.5, trace)
+    row = watch.row(
+        RowFormat(TRACE_KEYS, ("own", "other")), Link(), 1000.0, 0.125, None, None, (7.0, 8.0), command,
+        (4.0, 5.0), True,
+    )  # fmt: skip
+    named = dict(zip([*SAMPLE_NAMES, "own", "other"], row, strict=True))
+    assert (named["t_s"], named["s_x_m_s2"], named["zeta_m_s2"], named["in_layer"]) == (
+        0.125,
+        1,
+        2,
+        1,
+    )
+    assert (named["ref_z1_x_m"], named["ref_z1_y_m"]) == (7.0, 8.0)
+    assert (named["eta1_cmd_m_s"], named["theta_dot_cmd_rad_s"]) == (0.25, 0.5)
+    assert (named["omega_cmd_left_rad_s"], named["omega_cmd_right_rad_s"]) == (4.0, 5.0)
+    assert (named["own"], named["deadline_miss"], named["pose_seen"], named["link_lost"]) == (
+        3,
+        1,
+        0,
+        0,
+    )
+    unknown = ("s_y_m_s2", "other", "est_x_m", "true_delta1_y_m", "pwm_left_counts", "battery_v")
+    assert all(math.isnan(named[name]) for name in unknown)
 
 
 def test_manifest_of_a_record_without_a_close(journal):

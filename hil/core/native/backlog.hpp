@@ -22,9 +22,10 @@ class LineBacklog {
   void write(double t_s, std::int64_t size, const char* whose = "") {
     const double waiting = waiting_bytes(t_s);
     if (waiting + static_cast<double>(size) > static_cast<double>(kPortBytes)) {
-      throw RigFault(words("%sport is full: %.0f bytes wait for a line of %.0f byte/s, it holds %d; send less often, "
-                           "or take a faster line",
-                           whose, waiting, bytes_1_s_, static_cast<int>(kPortBytes)));
+      throw RigFault(
+          words("%sport is full: %.0f bytes wait for a line of %.0f byte/s, it holds %d; send less often, "
+                "or take a faster line",
+                whose, waiting, bytes_1_s_, static_cast<int>(kPortBytes)));
     }
     free_s_ = std::max(t_s, free_s_) + static_cast<double>(size) / bytes_1_s_;
   }

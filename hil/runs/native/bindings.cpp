@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <vector>
 
 #include "pump.hpp"
 
@@ -33,9 +34,12 @@ double number(nb::handle object, const char* name) { return nb::cast<double>(obj
 // An Estimate or a Truth as the rows have it.
 Motion motion_of(nb::handle state) {
   const nb::object pose = state.attr("pose"), z1 = state.attr("z1_m");
-  return {number(pose, "x_m"),        number(pose, "y_m"),
-          number(pose, "theta_rad"),  number(state, "eta1_m_s"),
-          number(state, "theta_dot_rad_s"), nb::cast<double>(z1[0]),
+  return {number(pose, "x_m"),
+          number(pose, "y_m"),
+          number(pose, "theta_rad"),
+          number(state, "eta1_m_s"),
+          number(state, "theta_dot_rad_s"),
+          nb::cast<double>(z1[0]),
           nb::cast<double>(z1[1])};
 }
 
@@ -93,16 +97,15 @@ struct Tick {
 
 nb::tuple row_of(Watch& watch, const RowFormat& format, const wire::Link& link, const Tick& tick,
                  const Motion* estimate, const Motion* truth) {
-  std::array<double, 512> values;
-  std::size_t count = 0;
-  const auto put = [&values, &count](double value) { values[count++] = value; };
-  watch.row(
-      tick.now_s, tick.t_s, estimate, truth, nb::cast<double>(tick.goal_m[0]), nb::cast<double>(tick.goal_m[1]),
-      tick.command, link, tick.late, put,
-      [&](auto put_term) { format.terms.both(tick.trace, 0, format.common, put_term); });
+  std::vector<double> values;
+  values.reserve(64 + format.terms.size());
+  const auto put = [&values](double value) { values.push_back(value); };
+  watch.row(tick.now_s, tick.t_s, estimate, truth, nb::cast<double>(tick.goal_m[0]),
+            nb::cast<double>(tick.goal_m[1]), tick.command, link, tick.late, put,
+            [&](auto put_term) { format.terms.both(tick.trace, 0, format.common, put_term); });
   format.terms.both(tick.trace, format.common, format.terms.size(), put);
-  PyObject* row = PyTuple_New(static_cast<Py_ssize_t>(count));
-  for (std::size_t i = 0; i < count; ++i) {
+  PyObject* row = PyTuple_New(static_cast<Py_ssize_t>(values.size()));
+  for (std::size_t i = 0; i < values.size(); ++i) {
     PyTuple_SET_ITEM(row, static_cast<Py_ssize_t>(i), PyFloat_FromDouble(values[i]));
   }
   return nb::steal<nb::tuple>(row);
@@ -135,7 +138,8 @@ void bind_plausibility(nb::module_& m) {
           [](Plausibility& p, const nb::bytes& picture, const nb::object& counts, double rad_per_count) {
             runs::Counts now{};
             if (!counts.is_none()) now = nb::cast<runs::Counts>(counts);
-            p.saw(std::string(picture.c_str(), picture.size()), counts.is_none() ? nullptr : &now, rad_per_count);
+            p.saw(std::string(picture.c_str(), picture.size()), counts.is_none() ? nullptr : &now,
+                  rad_per_count);
           },
           "picture"_a, "counts"_a.none(), "rad_per_count"_a)
       .def("check", &Plausibility::check, "now_s"_a, "given_rad_s"_a, "pwm_counts"_a, "pwm_top_counts"_a)
@@ -172,8 +176,10 @@ void bind_watch(nb::module_& m) {
                      return w.has_frame ? nb::object(nb::str(w.why_not_seen.c_str())) : nb::none();
                    })
       .def_rw("camera_latency_s", &Watch::camera_latency_s)
-      .def("check_clock", [](Watch& w, double now_s) { w.supervisor.check_clock(now_s); }, "now_s"_a)
-      .def("check_host", [](Watch& w, double now_s) { w.supervisor.check_host(now_s); }, "now_s"_a)
+      .def(
+          "check_clock", [](Watch& w, double now_s) { w.supervisor.check_clock(now_s); }, "now_s"_a)
+      .def(
+          "check_host", [](Watch& w, double now_s) { w.supervisor.check_host(now_s); }, "now_s"_a)
       .def(
           "check_estimate", [](Watch& w, double x_m, double y_m) { w.supervisor.check_estimate(x_m, y_m); },
           "x_m"_a, "y_m"_a)
@@ -233,9 +239,55 @@ void bind_watch(nb::module_& m) {
       .def("short_turn", [](const Watch& w) { return w.limits.verdict(); });
 }
 
+// An Estimate as its constructor would make it; the class is frozen, and its constructor slow for that.
+class EstimateMaker {
+ public:
+  nb::object make(double t_s, const estimator::State& s, const std::array<int, 2>& sides, bool hard) const {
+    const nb::object pose =
+        filled(pose_, {"x_m", "y_m", "theta_rad"},
+               {nb::float_(s.pose.x_m), nb::float_(s.pose.y_m), nb::float_(s.pose.theta_rad)});
+    return filled(
+        estimate_,
+        {"t_host_s", "pose", "eta1_m_s", "theta_dot_rad_s", "z1_m", "z2_m_s", "z3_m_s2", "sides_at_limit",
+         "driven_hard"},
+        {nb::float_(t_s), pose, nb::float_(s.eta1_m_s), nb::float_(s.theta_dot_rad_s),
+         nb::make_tuple(s.z1_m[0], s.z1_m[1]), nb::make_tuple(s.z2_m_s[0], s.z2_m_s[1]), nb::none(),
+         nb::make_tuple(sides[0], sides[1]), nb::bool_(hard)});
+  }
+
+ private:
+  template <std::size_t N>
+  static nb::object filled(const nb::object& type, const char* const (&names)[N],
+                           const nb::object (&values)[N]) {
+    static PyObject* interned[N] = {};
+    static PyObject* nothing = PyTuple_New(0);
+    PyTypeObject* kind = reinterpret_cast<PyTypeObject*>(type.ptr());
+    const nb::object out = nb::steal(kind->tp_new(kind, nothing, nullptr));
+    for (std::size_t i = 0; i < N; ++i) {
+      if (interned[i] == nullptr) interned[i] = PyUnicode_InternFromString(names[i]);
+      if (PyObject_GenericSetAttr(out.ptr(), interned[i], values[i].ptr()) != 0) throw nb::python_error();
+    }
+    return out;
+  }
+
+  nb::object types_ = nb::module_::import_("hil.core.types");
+  nb::object estimate_ = types_.attr("Estimate"), pose_ = types_.attr("Pose");
+};
+
+const EstimateMaker& estimates() {
+  static const EstimateMaker* maker = new EstimateMaker();  // never freed: the interpreter ends first
+  return *maker;
+}
+
+nb::object look(Pump& pump, Watch& watch, double now_s, double most_counts, double stall_counts) {
+  const estimator::State& state = pump.look(now_s, most_counts);
+  return estimates().make(now_s + watch.uplink_s, state, pump.sides(), watch.driven_hard(stall_counts));
+}
+
 nb::list others_of(Pump& pump) {
   nb::list out;
-  for (const auto& [id, frame] : pump.others) out.append(nb::make_tuple(id, nb::bytes(frame.data(), frame.size())));
+  for (const auto& [id, frame] : pump.others)
+    out.append(nb::make_tuple(id, nb::bytes(frame.data(), frame.size())));
   return out;
 }
 
@@ -252,7 +304,8 @@ nb::list frame_rows(const Pump& pump, double origin_s) {
 }
 
 core::SimulatedRig& rig_of(const nb::capsule& handle) {
-  if (std::strcmp(handle.name(), core::kSimulatedRig) != 0) throw nb::type_error("not a simulated rig's handle");
+  if (std::strcmp(handle.name(), core::kSimulatedRig) != 0)
+    throw nb::type_error("not a simulated rig's handle");
   return *static_cast<core::SimulatedRig*>(handle.data());
 }
 
@@ -267,9 +320,11 @@ void bind_pump(nb::module_& m) {
           nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(),
           nb::keep_alive<1, 6>(), "rig"_a, "link"_a, "camera"_a, "fused"_a, "watch"_a, "note"_a)
       .def(
-          "begin", [](Pump& p, double until_s, bool busy) { return static_cast<int>(p.begin(until_s, busy)); },
+          "begin",
+          [](Pump& p, double until_s, bool busy) { return static_cast<int>(p.begin(until_s, busy)); },
           "until_s"_a, "busy"_a)
-      .def("go_on", [](Pump& p, bool busy) { return static_cast<int>(p.go_on(busy)); }, "busy"_a)
+      .def(
+          "go_on", [](Pump& p, bool busy) { return static_cast<int>(p.go_on(busy)); }, "busy"_a)
       .def_prop_ro("now_s", &Pump::now_s)
       .def("others", &others_of)
       .def("frame_rows", &frame_rows, "origin_s"_a)
@@ -279,16 +334,22 @@ void bind_pump(nb::module_& m) {
             watch.check(now_s, p.agreement(now_s), pwm_top_counts);
           },
           "watch"_a, "now_s"_a, "pwm_top_counts"_a)
+      .def("look", &look, "watch"_a, "now_s"_a, "most_counts"_a, "stall_counts"_a)
       .def(
-          "row",
-          [](const Pump& p, Watch& watch, const RowFormat& format, double now_s, double t_s,
-             const nb::tuple& goal_m, nb::handle command, const nb::tuple& wheels, bool late) {
+          "act",
+          [](Pump& p, Watch& watch, const RowFormat& format, double now_s, double t_s, double dt_s,
+             const nb::tuple& looked_goal_m, const nb::tuple& goal_m, nb::handle command,
+             const nb::tuple& wheels, bool late) {
+            const Tick tick = tick_of(now_s, t_s, goal_m, command, wheels, late);
+            p.act(now_s, dt_s, tick.command, nb::cast<double>(looked_goal_m[0]),
+                  nb::cast<double>(looked_goal_m[1]));
             const auto estimate = p.estimate(now_s);
             const Motion truth = p.truth();
-            return row_of(watch, format, p.link(), tick_of(now_s, t_s, goal_m, command, wheels, late),
-                          estimate ? &*estimate : nullptr, &truth);
+            return row_of(watch, format, p.link(), tick, estimate ? &*estimate : nullptr, &truth);
           },
-          "watch"_a, "format"_a, "now_s"_a, "t_s"_a, "goal_m"_a, "command"_a, "wheels_rad_s"_a, "late"_a)
+          "watch"_a, "format"_a, "now_s"_a, "t_s"_a, "dt_s"_a, "looked_goal_m"_a, "goal_m"_a, "command"_a,
+          "wheels_rad_s"_a, "late"_a)
+      .def_prop_ro("rig_now_s", &Pump::rig_now_s)
       .def(
           "send_setpoint",
           [](Pump& p, double t_s, double left_rad_s, double right_rad_s) {

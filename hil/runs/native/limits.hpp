@@ -40,7 +40,8 @@ class WheelLimits {
     if (short_s_ < std::max(kTold_s, kToldRatio * ran_s_)) return "";
     const int worst = side_s_[0] > side_s_[1] ? 0 : 1;
     return core::words(
-        "the turn needs more torque than the motors give: %s side at its limit %.0f%% of the run, %.2g of %.2g rad/s "
+        "the turn needs more torque than the motors give: %s side at its limit %.0f%% of the run, %.2g of "
+        "%.2g rad/s "
         "made for %.1f s; a floor with less grip, stronger motors, a charged battery, or less weight",
         worst == 0 ? "left" : "right", 100.0 * (side_s_[worst] / ran_s_), made_rad_ / short_s_,
         asked_rad_ / short_s_, short_s_);

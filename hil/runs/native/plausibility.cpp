@@ -55,15 +55,17 @@ void Plausibility::saw(const std::string& picture, const Counts* counts, double 
 }
 
 std::string Plausibility::narrowed(const std::string& fault) const {
-  if (!stops_[kFramesRepeated] || repeats_ < kRepeatedFrames || turned_rad_ < kRepeatedLeast_rad) return fault;
+  if (!stops_[kFramesRepeated] || repeats_ < kRepeatedFrames || turned_rad_ < kRepeatedLeast_rad)
+    return fault;
   return repeated() + "; " + fault;
 }
 
 std::string Plausibility::repeated() const {
-  return words("camera: frames repeated: the same picture %lld times while the wheels turned %.2f rad (limits %lld "
-               "times, %g rad); camera or its driver hangs",
-               static_cast<long long>(repeats_ + 1), turned_rad_, static_cast<long long>(kRepeatedFrames + 1),
-               kRepeatedTurn_rad);
+  return words(
+      "camera: frames repeated: the same picture %lld times while the wheels turned %.2f rad (limits %lld "
+      "times, %g rad); camera or its driver hangs",
+      static_cast<long long>(repeats_ + 1), turned_rad_, static_cast<long long>(kRepeatedFrames + 1),
+      kRepeatedTurn_rad);
 }
 
 void Plausibility::check(double now_s, const Sides& given_rad_s, const Sides& pwm_counts,
@@ -87,9 +89,10 @@ void Plausibility::check_progress(double now_s, double error_m) {
   if (std::isnan(least_s_)) least_s_ = now_s;
   const double stalled_s = now_s - least_s_;
   if (stalled_s > kNoProgress_s) {
-    react(kNoProgress, words("robot: no progress: %.3f m from the goal, and not nearer than %.3f m for %.1f s (limits "
-                             "%g m, %g s); circling, held, or a weak motor?",
-                             error_m, least_m_, stalled_s, kFar_m, kNoProgress_s));
+    react(kNoProgress,
+          words("robot: no progress: %.3f m from the goal, and not nearer than %.3f m for %.1f s (limits "
+                "%g m, %g s); circling, held, or a weak motor?",
+                error_m, least_m_, stalled_s, kFar_m, kNoProgress_s));
   }
 }
 
@@ -99,9 +102,10 @@ void Plausibility::finish() {
     if (side.weak_s < kWeak_s || side.asked_rad <= 0.0) continue;
     const double ratio = std::max(side.given_rad, 0.0) / side.asked_rad;
     if (ratio >= kWeakRatio) continue;
-    note_(kDiagnosis, words("side weak: %s side gives %.2g of what is asked (full PWM for %.1f s; limits %g, %g s); "
-                            "motor, lead, or a brake on that side?",
-                            kSides[index], ratio, side.weak_s, kWeakRatio, kWeak_s));
+    note_(kDiagnosis,
+          words("side weak: %s side gives %.2g of what is asked (full PWM for %.1f s; limits %g, %g s); "
+                "motor, lead, or a brake on that side?",
+                kSides[index], ratio, side.weak_s, kWeakRatio, kWeak_s));
   }
 }
 
@@ -117,9 +121,10 @@ void Plausibility::check_side(double now_s, double dt_s, int index, double given
   const bool stands = std::fabs(side.stuck_given_rad) < kStuckRatio * std::fabs(side.stuck_asked_rad);
   const bool weak = side.weak_s > kWeak_s && side.given_rad > kTurnsRatio * side.asked_rad;
   if (stuck_s >= kStuck_s && stands && !weak) {
-    react(kMotorStuck, words("motor stuck: %s wheels turn %.2f rad/s of %.2f rad/s asked at %.0f%% PWM for %.2f s "
-                             "(limits %.0f%%, %g s)",
-                             kSides[index], given, asked, 100.0 * pwm_ratio, stuck_s, 100.0 * kStuckRatio, kStuck_s));
+    react(kMotorStuck,
+          words("motor stuck: %s wheels turn %.2f rad/s of %.2f rad/s asked at %.0f%% PWM for %.2f s "
+                "(limits %.0f%%, %g s)",
+                kSides[index], given, asked, 100.0 * pwm_ratio, stuck_s, 100.0 * kStuckRatio, kStuck_s));
   }
   check_dips(now_s, index, given);
   const double full_s = side.full.after(now_s, moving && pwm_ratio >= kFullPwmRatio);
@@ -152,11 +157,11 @@ void Plausibility::check_dips(double now_s, int index, double given) {
   side.turned = std::fabs(given) > kTurnedRatio * std::fabs(asked) || (side.turned && began_s < kInfinite);
   while (!side.dips_s.empty() && now_s - side.dips_s.front() > kDipWindow_s) side.dips_s.pop_front();
   if (side.dips_s.size() < kDips) return;
-  react(kEncoderIntermittent,
-        words("encoder intermittent: %s counts stopped and came back %zu times within %.2f s while %.1f rad/s were asked "
-              "(limits %zu times, %g s); check its plug",
-              kSides[index], side.dips_s.size(), now_s - side.dips_s.front() + kDipMost_s, asked, kDips,
-              kDipWindow_s));
+  react(kEncoderIntermittent, words("encoder intermittent: %s counts stopped and came back %zu times within "
+                                    "%.2f s while %.1f rad/s were asked "
+                                    "(limits %zu times, %g s); check its plug",
+                                    kSides[index], side.dips_s.size(),
+                                    now_s - side.dips_s.front() + kDipMost_s, asked, kDips, kDipWindow_s));
 }
 
 void Plausibility::check_swapped(double now_s, const Sides& given) {
@@ -167,9 +172,10 @@ void Plausibility::check_swapped(double now_s, const Sides& given) {
                        others < kSwappedRatio * own;
   const double held_s = swapped_.after(now_s, against);
   if (held_s < kSwapped_s) return;
-  react(kSidesSwapped, words("sides swapped: left gives %.1f rad/s of %.1f asked, right %.1f of %.1f, each what the "
-                             "other is asked for, for %.2f s (limit %g s); motors or encoders exchanged",
-                             given[0], left, given[1], right, held_s, kSwapped_s));
+  react(kSidesSwapped,
+        words("sides swapped: left gives %.1f rad/s of %.1f asked, right %.1f of %.1f, each what the "
+              "other is asked for, for %.2f s (limit %g s); motors or encoders exchanged",
+              given[0], left, given[1], right, held_s, kSwapped_s));
 }
 
 void Plausibility::react(Reaction what, const std::string& evidence) {

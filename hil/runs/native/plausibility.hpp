@@ -22,7 +22,14 @@ using Counts = std::array<std::int32_t, 2>;
 using Note = std::function<void(const char*, const std::string&)>;
 
 // What may be wrong, in the order of kReactions.
-enum Reaction : int { kFramesRepeated, kNoProgress, kMotorStuck, kEncoderIntermittent, kSidesSwapped, kReactionCount };
+enum Reaction : int {
+  kFramesRepeated,
+  kNoProgress,
+  kMotorStuck,
+  kEncoderIntermittent,
+  kSidesSwapped,
+  kReactionCount
+};
 constexpr const char* kReactions[kReactionCount] = {"frames_repeated", "no_progress", "motor_stuck",
                                                     "encoder_intermittent", "sides_swapped"};
 constexpr const char kDiagnosis[] = "diagnosis";  // kind of the record's events that the verdict repeats
@@ -43,7 +50,8 @@ struct Held {
 // Judges each tick; throws RigFault for a fault whose reaction is to stop, notes the others once.
 class Plausibility {
  public:
-  Plausibility(const std::array<bool, kReactionCount>& stops, Note note) : stops_(stops), note_(std::move(note)) {}
+  Plausibility(const std::array<bool, kReactionCount>& stops, Note note)
+      : stops_(stops), note_(std::move(note)) {}
 
   // Takes one frame. `picture` is what equal pictures have equal, "" where there is nothing to compare;
   // `counts` are those of the newest report, nullptr before one. The same picture again while the wheels

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "exact.hpp"
+
 namespace runs {
 
 std::string odd_stamp(double ahead_s) {
@@ -106,11 +108,26 @@ Agreement Pump::agreement(double now_s) const {
           {x[estimator::kDistance], x[estimator::kTurn]}};
 }
 
+const estimator::State& Pump::look(double now_s, double most_counts) {
+  looked_ = fused_.state_at(now_s + watch_.uplink_s);
+  if (!looked_) throw core::RigFault("camera: no pose to estimate from");
+  watch_.supervisor.check_estimate(looked_->pose.x_m, looked_->pose.y_m);
+  sides_ = watch_.sides(most_counts);
+  return *looked_;
+}
+
+void Pump::act(double now_s, double dt_s, const Command& command, double goal_x_m, double goal_y_m) {
+  send_setpoint(rig_.now_s(), command.left_rad_s, command.right_rad_s);
+  fused_.take_command(now_s + watch_.uplink_s, {command.left_rad_s, command.right_rad_s});
+  const double error_m = core::hypot(goal_x_m - looked_->z1_m[0], goal_y_m - looked_->z1_m[1]);
+  watch_.take_tick(now_s, dt_s, sides_, command, looked_->theta_dot_rad_s, error_m);
+}
+
 std::optional<Motion> Pump::estimate(double t_s) const {
   const auto state = fused_.state_at(t_s);
   if (!state) return std::nullopt;
-  return Motion{state->pose.x_m, state->pose.y_m,        state->pose.theta_rad, state->eta1_m_s,
-                state->theta_dot_rad_s, state->z1_m[0], state->z1_m[1]};
+  return Motion{state->pose.x_m,        state->pose.y_m, state->pose.theta_rad, state->eta1_m_s,
+                state->theta_dot_rad_s, state->z1_m[0],  state->z1_m[1]};
 }
 
 Motion Pump::truth() const {

@@ -3,6 +3,7 @@
 // any rig and any estimator; what both do with what has come is Watch, Link, the clocks and the estimator.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <utility>
@@ -21,8 +22,8 @@ class Pump {
  public:
   enum Stop { kReached, kHeard, kTaken };
 
-  Pump(core::SimulatedRig& rig, wire::Link& link, core::CameraClock& camera, estimator::Fused& fused, Watch& watch,
-       Note note)
+  Pump(core::SimulatedRig& rig, wire::Link& link, core::CameraClock& camera, estimator::Fused& fused,
+       Watch& watch, Note note)
       : rig_(rig), link_(link), camera_(camera), fused_(fused), watch_(watch), note_(std::move(note)) {}
 
   // Takes what arrives until until_s, and waits once at least. Stops on the way where messages wait in
@@ -39,6 +40,13 @@ class Pump {
   void send_setpoint(double t_s, double left_rad_s, double right_rad_s) {
     write(link_.setpoint(t_s, left_rad_s, right_rad_s));
   }
+  double rig_now_s() const { return rig_.now_s(); }
+  // The state at the actuation time of a tick at now_s, inside the fence; else RigFault. With it: which side
+  // stands at its limit of most_counts.
+  const estimator::State& look(double now_s, double most_counts);
+  const std::array<int, 2>& sides() const { return sides_; }
+  // Sends what a tick asks of the wheels, and tells estimator and judges of it; goal is that of the look.
+  void act(double now_s, double dt_s, const Command& command, double goal_x_m, double goal_y_m);
   // Sends a frame to the board.
   void write(const std::string& frame);
 
@@ -69,6 +77,8 @@ class Pump {
   bool waited_ = false;
   std::int64_t restarts_ = 0;
   std::vector<wire::WheelReport> reports_;
+  std::optional<estimator::State> looked_;
+  std::array<int, 2> sides_{};
 };
 
 }  // namespace runs

@@ -36,9 +36,10 @@ void Supervisor::check_host(double now_s) {
   const double away_s = now_s - last_tick_s_;
   last_tick_s_ = now_s;
   if (away_s > kBoardWaits_s) {
-    throw core::RigFault(words("host: %.2f s between two ticks (limit %g s: the board stops by itself then); process "
-                               "stopped, machine suspended or overloaded, or its clock stepped",
-                               away_s, kBoardWaits_s));
+    throw core::RigFault(
+        words("host: %.2f s between two ticks (limit %g s: the board stops by itself then); process "
+              "stopped, machine suspended or overloaded, or its clock stepped",
+              away_s, kBoardWaits_s));
   }
 }
 
@@ -73,10 +74,11 @@ void Supervisor::check_agreement(const Agreement& agreement) const {
   const std::string duration = words("for %.2f s (limit %g s)", agreement.age_s, safety_.pose_lost_s);
   if (refused_ >= kRefusedPoses) {
     const auto [x_m, y_m, turn_rad] = agreement.refused;
-    throw Disagreement(words("camera and wheels disagree: robot not seen where the wheels take it %s: %lld poses "
-                             "refused, the last one %.3f m and %.0f deg off; %s",
-                             duration.c_str(), refused_, core::hypot(x_m, y_m),
-                             turn_rad * (180.0 / 3.14159265358979323846), kDisagreeWhy));
+    throw Disagreement(
+        words("camera and wheels disagree: robot not seen where the wheels take it %s: %lld poses "
+              "refused, the last one %.3f m and %.0f deg off; %s",
+              duration.c_str(), refused_, core::hypot(x_m, y_m), turn_rad * (180.0 / 3.14159265358979323846),
+              kDisagreeWhy));
   }
   throw core::RigFault("camera: robot not seen " + duration + (reason_.empty() ? "" : ": " + reason_));
 }
@@ -87,9 +89,10 @@ void Supervisor::check_scales(const Agreement& agreement) {
     const double seen = agreement.scales[i];
     const char* unit = i == 0 ? "m" : "rad";
     if (kLeastScale <= seen && seen <= kMostScale) continue;
-    throw Disagreement(words("camera and wheels disagree: %.2f %s seen for each %s that the wheels turn (limits %g to "
-                             "%g %s); %s",
-                             seen, unit, unit, kLeastScale, kMostScale, unit, kDisagreeWhy));
+    throw Disagreement(
+        words("camera and wheels disagree: %.2f %s seen for each %s that the wheels turn (limits %g to "
+              "%g %s); %s",
+              seen, unit, unit, kLeastScale, kMostScale, unit, kDisagreeWhy));
   }
 }
 

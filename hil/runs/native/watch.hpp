@@ -67,10 +67,10 @@ class Watch {
       throw core::RigFault(plausibility.narrowed(fault.what()));
     }
     if (!has_report) return;
-    plausibility.check(now_s, {report.wire.omega_left_rad_s, report.wire.omega_right_rad_s},
-                       {static_cast<double>(report.wire.pwm_left_counts),
-                        static_cast<double>(report.wire.pwm_right_counts)},
-                       pwm_top_counts);
+    plausibility.check(
+        now_s, {report.wire.omega_left_rad_s, report.wire.omega_right_rad_s},
+        {static_cast<double>(report.wire.pwm_left_counts), static_cast<double>(report.wire.pwm_right_counts)},
+        pwm_top_counts);
   }
 
   // 1 (forward) or -1 (backward) for a side at its limit that lacks speed of what it was asked, else 0.
@@ -99,8 +99,8 @@ class Watch {
   // Calls put(value) for each value of a tick's row in the order of hil.record.schema.SAMPLE_NAMES; trace(put)
   // puts the law's. nullptr is not known.
   template <typename Put, typename Trace>
-  void row(double now_s, double t_s, const Motion* estimate, const Motion* truth, double goal_x_m, double goal_y_m,
-           const Command& command, const wire::Link& link, bool late, Put put, Trace trace) {
+  void row(double now_s, double t_s, const Motion* estimate, const Motion* truth, double goal_x_m,
+           double goal_y_m, const Command& command, const wire::Link& link, bool late, Put put, Trace trace) {
     put(t_s);
     motion(estimate, put);
     motion(truth, put);
@@ -116,9 +116,10 @@ class Watch {
     put(command.left_rad_s);
     put(command.right_rad_s);
     const mavlink_wheel_state_t& w = report.wire;
-    for (const double value : {static_cast<double>(w.omega_left_rad_s), static_cast<double>(w.omega_right_rad_s),
-                               static_cast<double>(w.pwm_left_counts), static_cast<double>(w.pwm_right_counts),
-                               static_cast<double>(w.s_left), static_cast<double>(w.s_right)}) {
+    for (const double value :
+         {static_cast<double>(w.omega_left_rad_s), static_cast<double>(w.omega_right_rad_s),
+          static_cast<double>(w.pwm_left_counts), static_cast<double>(w.pwm_right_counts),
+          static_cast<double>(w.s_left), static_cast<double>(w.s_right)}) {
       put(has_report ? value : kNone);
     }
     put(link.battery_v);

@@ -20,12 +20,12 @@ std::string_view view(const nb::bytes& data) { return {data.c_str(), data.size()
 nb::bytes bytes_of(std::string_view data) { return nb::bytes(data.data(), data.size()); }
 
 // The fields of a WHEEL_STATE in the order of the message.
-#define WHEEL_STATE_FIELDS(X)                                                             \
-  X(t_mcu_us)                                                                             \
-  X(left_counts)                                                                          \
-  X(right_counts) X(omega_left_rad_s) X(omega_right_rad_s) X(error_rate_left_rad_s2)      \
-      X(error_rate_right_rad_s2) X(s_left) X(s_right) X(t_setpoint_us) X(pwm_left_counts) \
-          X(pwm_right_counts) X(setpoint_seq) X(state) X(reason) X(flags)
+// clang-format off
+#define WHEEL_STATE_FIELDS(X)                                                                \
+  X(t_mcu_us) X(left_counts) X(right_counts) X(omega_left_rad_s) X(omega_right_rad_s)        \
+  X(error_rate_left_rad_s2) X(error_rate_right_rad_s2) X(s_left) X(s_right) X(t_setpoint_us) \
+  X(pwm_left_counts) X(pwm_right_counts) X(setpoint_seq) X(state) X(reason) X(flags)
+// clang-format on
 
 nb::tuple fields_of(const mavlink_wheel_state_t& m) {
 #define X(name) m.name,

@@ -1,0 +1,204 @@
+"""The two ways in which a run takes in what arrives give the same run to the bit.
+
+From arrival to arrival in native code; or step by step in Python, which every other rig, estimator and
+record needs.
+"""
+
+import gc
+import math
+import weakref
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hil.board.wheel_laws import WHEEL_LAWS
+from hil.config.load import load_scenario
+from hil.core import _native as core_native
+from hil.core.clocks import CameraClock
+from hil.record.memory import MemoryRecorder
+from hil.rigs.opening import open_rig
+from hil.runs import intake
+from hil.runs.execute import (
+    RunSpec,
+    board_parameters,
+    execute_in_memory,
+    make_law,
+    make_manifest,
+    make_parts,
+)
+from hil.runs.session import Session
+from hil.wire.identity import board_hashes
+
+# Each with what it needs besides its kind; they begin after half a second.
+FAULTS = {
+    "none": "",
+    "camera_occluded": "end_s = 1.2",
+    "camera_stall": "end_s = 0.9",
+    "camera_repeated": "end_s = 1.0",
+    "camera_clock_step": "end_s = 1.5, step_s = 0.5",
+    "link_cut": "end_s = 0.7",
+    "link_up_cut": "end_s = 1.4",
+    "link_down_cut": "end_s = 1.4",
+    "link_duplicated": "end_s = 1.5",
+    "link_reordered": "end_s = 1.5",
+    "motor_stuck": 'side = "left"',
+    "dead_encoder": 'side = "right"',
+    "board_reset": "",
+}
+CASES = st.fixed_dictionaries(
+    {
+        "scenario": st.sampled_from(["scenario-1", "scenario-2", "scenario-3", "circle"]),
+        "outer": st.sampled_from(["asg-ism", "pid", "backstepping", "super-twisting"]),
+        "inner": st.sampled_from(sorted(WHEEL_LAWS)),
+        "fault": st.sampled_from(sorted(FAULTS)),
+        "loss": st.sampled_from([0.0, 0.05]),
+        "corruption": st.sampled_from([0.0, 0.002]),
+        "drop": st.sampled_from([0.0, 0.2]),
+        "seed": st.integers(0, 10_000),
+    }
+)
+ONE = {
+    "scenario": "scenario-1",
+    "outer": "asg-ism",
+    "inner": "asg-ism",
+    "fault": "none",
+    "loss": 0.0,
+    "corruption": 0.0,
+    "drop": 0.0,
+    "seed": 3,
+}
+
+
+def spec_of(case):
+    """Return two seconds of a case."""
+    settings_ = [
+        "duration_s=2",
+        f"link.loss_ratio={case['loss']}",
+        f"link.corruption_ratio={case['corruption']}",
+        f"camera.drop_ratio={case['drop']}",
+    ]
+    if case["fault"] != "none":
+        more = FAULTS[case["fault"]]
+        fault = f'kind = "{case["fault"]}", start_s = 0.5{", " + more if more else ""}'
+        settings_.append(f"faults=[{{{fault}}}]")
+    scenario = load_scenario(case["scenario"], settings_)
+    return RunSpec(scenario, "twin", "pose", case["outer"], case["inner"], case["seed"], Path())
+
+
+def run(case, make_pump):
+    """Return the record of a case with the intake that `make_pump` gives."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(intake, "make_pump", make_pump)
+        return execute_in_memory(spec_of(case))
+
+
+def in_native(case):
+    """Return the record of a case taken in by native code, which it must be."""
+    made = []
+
+    def make_pump(*parts):
+        made.append(REAL(*parts))
+        return made[-1]
+
+    record = run(case, make_pump)
+    assert made[0] is not None
+    return record
+
+
+def in_python(case):
+    """Return the record of a case taken in by Python."""
+    return run(case, lambda *_: None)
+
+
+REAL = intake.make_pump
+
+
+def differences(one, other):
+    """Return the names of what two records have not equal to the bit."""
+    found = [
+        f"{table}.{name}"
+        for table in ("samples", "frames")
+        for name, values in getattr(one, table).items()
+        if np.asarray(values).tobytes() != np.asarray(getattr(other, table)[name]).tobytes()
+    ]
+    for name in ("outcome", "outcome_detail", "link", "tick_count"):
+        if getattr(one.manifest, name) != getattr(other.manifest, name):
+            found.append(name)
+    if one.events != other.events:
+        found.append("events")
+    if one.manifest.outcome == "complete" and repr(one.figures().values) != repr(
+        other.figures().values
+    ):
+        found.append("figures")
+    return found
+
+
+@settings(max_examples=25, deadline=None)
+@given(CASES)
+def test_both_ways_give_the_same_run(case):
+    """Samples, frames, events, counters, outcome and figures are equal to the bit, whatever is drawn."""
+    assert differences(in_native(case), in_python(case)) == []
+
+
+@pytest.mark.parametrize("fault", sorted(FAULTS))
+def test_both_ways_give_the_same_run_under_each_fault(fault):
+    """The same for each fault by itself; one that ends the run ends it with the same words."""
+    case = ONE | {"fault": fault}
+    assert differences(in_native(case), in_python(case)) == []
+
+
+def test_the_comparison_sees_a_changed_constant():
+    """With a microsecond more of camera latency on one way alone the runs differ (negative control)."""
+
+    def make_pump(parts, watch, note):
+        latency_s = spec_of(ONE).scenario.camera.latency_s + 1e-6
+        return REAL(replace(parts, camera_clock=CameraClock(latency_s)), watch, note)
+
+    changed = differences(run(ONE, make_pump), in_python(ONE))
+    assert {"samples.est_x_m", "frames.t_exposure_s", "figures"} <= set(changed)
+
+
+@pytest.mark.parametrize(
+    ("what", "more"),
+    [
+        ("another estimator", ["control.estimator=observed-acceleration"]),
+        ("a host that stops", ['faults=[{kind = "host_stopped", start_s = 1.0, end_s = 1.1}]']),
+    ],
+)
+def test_what_native_code_cannot_do_is_left_to_python(what, more):
+    """Where somebody asks for Python objects there is no native intake; the run goes on as ever."""
+    spec = replace(spec_of(ONE), scenario=load_scenario("scenario-1", ["duration_s=1.5", *more]))
+    made = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(intake, "make_pump", lambda *parts: made.append(REAL(*parts)) or made[-1])
+        record = execute_in_memory(spec)
+    assert made == [None], what
+    assert record.manifest.tick_count > 30
+
+
+def test_a_session_with_native_parts_is_forgotten_after_its_run():
+    """Native parts keep no way back to their session: a campaign would keep every run."""
+    spec = spec_of(ONE)
+    rig = open_rig("twin", spec.scenario, "pose", spec.seed)
+    parts = make_parts(spec, rig, MemoryRecorder(make_manifest(spec)), make_law(spec))
+    session = Session(
+        spec.scenario, parts, board_parameters(spec.scenario, spec.inner), board_hashes
+    )
+    assert session.run().outcome == "complete"
+    kept = [weakref.ref(session), weakref.ref(rig)]
+    del session, parts, rig
+    gc.collect()
+    assert [ref() for ref in kept] == [None, None]
+
+
+@given(
+    st.floats(allow_nan=False, min_value=-1e6, max_value=1e6),
+    st.floats(allow_nan=False, min_value=-1e6, max_value=1e6),
+)
+def test_native_hypot_is_that_of_the_interpreter(a, b):
+    """To a unit in the last place, which is what interpreters differ by."""
+    assert abs(core_native.hypot(a, b) - math.hypot(a, b)) <= math.ulp(math.hypot(a, b))
