@@ -17,7 +17,7 @@ import numpy as np
 import pyarrow as pa
 
 from hil.analysis.intervals import Interval
-from hil.analysis.stats import Paired, Tape, level, paired
+from hil.analysis.stats import Paired, level, paired
 from hil.core.figures import BY_NAME
 from hil.report.arms import Arm, arm_names, law_rank
 from hil.study.campaign.merge import is_text
@@ -51,7 +51,7 @@ class Outcomes:
     points: dict[str, NDArray[Any]]
     figures: Mapping[str, Array]
     complete: NDArray[np.bool_]
-    tapes: tuple[Tape, ...]
+    tapes: NDArray[np.int64]  # pairs x (seed, draw)
 
     @property
     def numeric_axes(self) -> list[str]:
@@ -76,15 +76,15 @@ class Outcomes:
 
     def level(self, figure: str, arm: int, pairs: NDArray[np.intp]) -> tuple[float, Interval]:
         """Return an arm's mean over the pairs that have the figure, and its 95 % interval."""
-        return level(self.figures[figure][pairs, arm].tolist(), [self.tapes[i] for i in pairs])
+        return level(self.figures[figure][pairs, arm], self.tapes[pairs])
 
     def difference(self, figure: str, arm: int, pairs: NDArray[np.intp]) -> Paired:
         """Return the paired difference of an arm to the baseline."""
         values = self.figures[figure][pairs]
         return paired(
-            values[:, 0].tolist(),
-            values[:, arm].tolist(),
-            [self.tapes[i] for i in pairs],
+            values[:, 0],
+            values[:, arm],
+            self.tapes[pairs],
             shares=figure == HOLDS.name,
         )
 
@@ -136,7 +136,7 @@ def outcomes_of(campaign: Campaign, table: Table) -> Outcomes:
         {axis: of_pairs(axis) for axis in campaign.axes},
         _Figures(table, order),
         complete.reshape(-1, count)[:, order],
-        tuple(zip(of_pairs("seed").tolist(), of_pairs("draw").tolist(), strict=True)),
+        np.column_stack([of_pairs("seed"), of_pairs("draw")]),
     )
 
 

@@ -108,7 +108,8 @@ def read_group(file: Path, group: int, schema: pa.Schema, names: Sequence[str] =
     """
     wanted = list(names) or schema.names
     with pq.ParquetFile(file, page_checksum_verification=True, pre_buffer=False) as parquet:
-        known = [name for name in wanted if name in parquet.schema_arrow.names]
+        there = set(parquet.schema_arrow.names)
+        known = [name for name in wanted if name in there]
         table = parquet.read_row_group(group, known, use_threads=False)
     if "program" in wanted and "program" not in known:
         table = table.append_column("program", pa.array([_UNKNOWN] * table.num_rows, pa.string()))

@@ -42,7 +42,9 @@ CAMPAIGN, PARTS, RESULTS, PAGE = "campaign.json", "parts", "results.parquet", "r
 # Outcome of a run that raised or killed its workers: no answer, and tried again when going on.
 ERROR = "error"
 _OURS = {CAMPAIGN, PARTS, RESULTS, PAGE, SET_ASIDE, LOCK}
-_PART_ROWS = 200
+# A part is written after so many rows, or as many seconds as work.py has it.
+_PART_ROWS = 2000
+_WHOSE = ("index", "outcome")
 _DIGEST = b"campaign_sha256"
 _COUNTED_ROWS = 1 << 16
 
@@ -85,7 +87,7 @@ class ResultStore:
         self._claim(campaign)
         self._rows: list[Row] = []
         self._runs = len(campaign.jobs())
-        self.done = self._places().done
+        self.done = self._places(names=self._schema.names).done
 
     def _claim(self, campaign: Campaign) -> None:
         """Make the folder, or take up this campaign's own; anything else is refused untouched."""
@@ -155,15 +157,15 @@ class ResultStore:
         _write(self.folder / PARTS / name, iter([table]), self._schema)
         self._rows.clear()
 
-    def _places(self) -> Places:
-        """Return where each row on disk is.
+    def _places(self, names: Sequence[str] = _WHOSE) -> Places:
+        """Return where each row on disk is; those columns are read, and so checked.
 
         A file that cannot be read is set aside and noted: its rows are missing then.
         """
         places = Places(self._runs)
         for file in self._files():
             try:
-                found = [self._whose(file, group) for group in range(group_count(file))]
+                found = [self._whose(file, group, names) for group in range(group_count(file))]
                 for group, (index, again) in enumerate(found):
                     places.add(file, group, index, again)
             except (OSError, pa.ArrowException, KeyError, ValueError) as error:
@@ -174,9 +176,11 @@ class ResultStore:
                 )
         return places
 
-    def _whose(self, file: Path, group: int) -> tuple[pa.ChunkedArray, pa.ChunkedArray]:
-        """Return the rows' indices and which are to be run again; every column is read, and so checked."""
-        table = read_group(file, group, self._schema)
+    def _whose(
+        self, file: Path, group: int, names: Sequence[str]
+    ) -> tuple[pa.ChunkedArray, pa.ChunkedArray]:
+        """Return the rows' indices, and which are to be run again."""
+        table = read_group(file, group, self._schema, names)
         return table.column("index"), is_text(table.column("outcome"), ERROR)
 
     def finish(self) -> Results:
@@ -227,6 +231,11 @@ def _programs_on_disk(path: Path) -> list[str]:
 def _write(path: Path, tables: Iterator[pa.Table], schema: pa.Schema) -> None:
     try:
         write_tables(path, tables, schema)
+    except pa.ArrowException as error:
+        raise RigFault(
+            f"{path}: a part of the rows cannot be read any more ({str(error).partition(chr(10))[0]}); "
+            "the same command runs those again"
+        ) from None
     except OSError as error:
         raise RigFault(
             f"{path}: cannot be written: {error.strerror or error}; the rows before are kept, the "
