@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
+    Codes = NDArray[np.intp]
 
 CONFIDENCE = 0.95
 RESAMPLES = 5_000
@@ -188,21 +189,30 @@ def median_interval(values: Array) -> tuple[Interval, float]:
     return Interval(float(ordered[rank - 1]), float(ordered[size - rank])), holds
 
 
-def by_group(values: Array, groups: Sequence[Hashable]) -> Array:
+def codes_of(names: Sequence[Hashable] | Codes) -> Codes:
+    """Return each name's number, in order of their first."""
+    if not isinstance(names, np.ndarray):
+        index = {name: number for number, name in enumerate(dict.fromkeys(names))}
+        return np.array([index[name] for name in names], np.intp)
+    _, first, place = np.unique(names, return_index=True, return_inverse=True)
+    number = np.empty(first.size, np.intp)
+    number[np.argsort(first, kind="stable")] = np.arange(first.size)
+    return number[place]
+
+
+def by_group(values: Array, groups: Sequence[Hashable] | Codes) -> Array:
     """Return one value a group, whose mean is that of all values: what varies from group to group.
 
     Groups of equal size: their means. Else the ratio estimator's linearisation, mean + G (sum of the
     group's deviations from the mean) / n. Source: W. Cochran, Sampling Techniques (1977), section 6.
     """
-    index = {group: number for number, group in enumerate(dict.fromkeys(groups))}
-    place = np.array([index[group] for group in groups], np.intp)
     mean = float(values.mean())
-    sums = np.bincount(place, weights=values - mean, minlength=len(index))
-    return np.asarray(mean + sums * len(index) / values.size, np.float64)
+    sums = np.bincount(codes_of(groups), weights=values - mean)
+    return np.asarray(mean + sums * sums.size / values.size, np.float64)
 
 
 def crossed_interval(
-    values: Array, rows: Sequence[Hashable], columns: Sequence[Hashable]
+    values: Array, rows: Sequence[Hashable] | Codes, columns: Sequence[Hashable] | Codes
 ) -> Interval:
     """Return the 95 % interval of the mean of values with a row and a column in common.
 
@@ -211,6 +221,7 @@ def crossed_interval(
     by Satterthwaite. Source: A. Cameron, J. Gelbach, D. Miller, J. Bus. Econ. Stat. 29 (2011) 238.
     """
     mean = float(values.mean())
+    rows, columns = codes_of(rows), codes_of(columns)
     parts = [by_group(values, names) for names in (rows, columns)]
     if min(part.size for part in parts) < 2:
         return mean_interval(max(parts, key=len))
@@ -226,15 +237,15 @@ def crossed_interval(
     return Interval(mean - reach, mean + reach)
 
 
-def _within_cells(values: Array, rows: Sequence[Hashable], columns: Sequence[Hashable]) -> float:
+def _within_cells(values: Array, rows: Codes, columns: Codes) -> float:
     """Return what of the mean's variance is neither its row's nor its column's."""
-    names = list(zip(rows, columns, strict=True))
-    cells, own = by_group(values, names), list(dict.fromkeys(names))
+    cell = codes_of(rows * (int(columns.max()) + 1) + columns)
+    cells = by_group(values, cell)
     rest = cells - cells.mean()
-    for side in (0, 1):
-        index = {name: number for number, name in enumerate(dict.fromkeys(c[side] for c in own))}
-        place = np.array([index[cell[side]] for cell in own])
+    _, first = np.unique(cell, return_index=True)
+    for names in (rows, columns):
+        place = codes_of(names[first])
         sums = np.bincount(place, weights=rest)
         rest = rest - (sums / np.bincount(place))[place]
-    freedom = len(own) - len(set(rows)) - len(set(columns)) + 1
-    return float(rest @ rest) / max(freedom, 1) / len(own)
+    freedom = cells.size - int(rows.max()) - int(columns.max()) - 1
+    return float(rest @ rest) / max(freedom, 1) / cells.size

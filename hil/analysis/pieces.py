@@ -118,7 +118,8 @@ def _of_ranks(parts: Callable[[], Iterator[Array]], ranks: Sequence[int]) -> lis
                     keys if shift == _TOP_SHIFT else keys[(keys >> np.uint64(shift + 16)) == prefix]
                 )
                 digits = (own >> np.uint64(shift)) & np.uint64(0xFFFF)
-                histogram += np.bincount(digits.astype(np.int64), minlength=1 << _DIGIT_BITS)
+                counted = np.bincount(digits.astype(np.int64), minlength=1 << _DIGIT_BITS)
+                np.add(histogram, counted, out=histogram)
         for which, prefix in enumerate(found.copy()):
             below = np.cumsum(counts[prefix])
             digit = int(np.searchsorted(below, left[which], "right"))

@@ -22,6 +22,7 @@ from hil.analysis.intervals import (
     Coverage,
     Interval,
     by_group,
+    codes_of,
     coverage_of,
     crossed_interval,
     mean_interval,
@@ -32,7 +33,11 @@ from hil.analysis.intervals import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from hil.analysis.intervals import Codes
+
     Array = NDArray[np.float64]
+    # Of an array the columns are seeds and draws.
+    Tapes = Sequence["Tape"] | NDArray[np.int64]
 
 # Differences that are equal up to this share of the values themselves are equal but for rounding.
 _ROUNDING = 1e-12
@@ -88,9 +93,9 @@ class Paired:
 
 
 def paired(
-    baseline: Sequence[float],
-    other: Sequence[float],
-    tapes: Sequence[Tape] | None = None,
+    baseline: Sequence[float] | Array,
+    other: Sequence[float] | Array,
+    tapes: Tapes | None = None,
     *,
     shares: bool = False,
 ) -> Paired:
@@ -108,8 +113,8 @@ def paired(
             0, left_out, 0, *(math.nan,) * 5, UNKNOWN, UNKNOWN, math.nan, None, *(math.nan,) * 3
         )
     difference = _without_rounding(one, two)
-    chosen = [tape for tape, here in zip(tapes, known, strict=True) if here] if tapes else []
-    found = _of_tapes(difference, chosen) if tapes else _OfMean.of(difference)
+    given = tapes is not None and len(tapes) > 0
+    found = _of_tapes(difference, *_codes(tapes, known)) if given else _OfMean.of(difference)
     interval = _of_shares(found, one, two) if shares else found.interval
     median, median_holds = UNKNOWN, math.nan
     if not found.crossed:
@@ -135,14 +140,24 @@ def paired(
     )
 
 
-def level(values: Sequence[float], tapes: Sequence[Tape]) -> tuple[float, Interval]:
+def level(values: Sequence[float] | Array, tapes: Tapes) -> tuple[float, Interval]:
     """Return the mean of one arm's known values and its 95 % interval; `tapes` as of `paired`."""
     found = np.asarray(values, np.float64)
     known = np.isfinite(found)
     if not known.any():
         return math.nan, UNKNOWN
+    return float(found[known].mean()), _of_tapes(found[known], *_codes(tapes, known)).interval
+
+
+def _codes(tapes: Tapes | None, known: NDArray[np.bool_]) -> tuple[Codes, Codes]:
+    """Return the seed and the draw of each known pair, numbered in order of their first."""
+    assert tapes is not None
+    if len(tapes) != known.size:
+        raise ValueError(f"{len(tapes)} tapes of {known.size} pairs")
+    if isinstance(tapes, np.ndarray):
+        return codes_of(tapes[known, 0]), codes_of(tapes[known, 1])
     chosen = [tape for tape, here in zip(tapes, known, strict=True) if here]
-    return float(found[known].mean()), _of_tapes(found[known], chosen).interval
+    return codes_of([tape[0] for tape in chosen]), codes_of([tape[1] for tape in chosen])
 
 
 def _without_rounding(one: Array, two: Array) -> Array:
@@ -172,13 +187,12 @@ class _OfMean:
         return not self.crossed and self.own.size >= 2
 
 
-def _of_tapes(values: Array, tapes: Sequence[Tape]) -> _OfMean:
+def _of_tapes(values: Array, seeds: Codes, draws: Codes) -> _OfMean:
     """Return the mean's interval where pairs share seeds or draws."""
-    seeds, draws = [tape[0] for tape in tapes], [tape[1] for tape in tapes]
-    several = [names for names in (seeds, draws) if len(set(names)) > 1]
+    several = [names for names in (seeds, draws) if names.max() > 0]
     if not several:
         return _OfMean.of(values[:1])
-    fewer = by_group(values, min(several, key=lambda names: len(set(names))))
+    fewer = by_group(values, min(several, key=np.max))
     if len(several) == 1:
         return _OfMean.of(fewer)
     return _OfMean(crossed_interval(values, seeds, draws), fewer, crossed=True)

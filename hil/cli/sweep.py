@@ -53,9 +53,9 @@ def command(
     outcomes = outcomes_of(campaign, table)
     page = folder / PAGE
     write_page(page, outcomes, command_line(), [*notes, *(f"Made by {name}." for name in made_by)])
-    ended, kept = table["outcome"].to_pylist(), table["holds"].to_pylist()
-    held, early = sum(kept), sum(outcome != "complete" for outcome in ended)
-    status = 3 if {"fault", "error"} & set(ended) else int(held < len(kept))
+    held = int(table.column("holds").to_numpy().sum())
+    early = sum(end["runs"] for end in ends.values())
+    status = 3 if {"fault", "error"} & set(ends) else int(held < totals.runs)
     efficiency = totals.efficiency
     document: dict[str, Any] = {
         "campaign": campaign.file.name,

@@ -149,7 +149,7 @@ def test_one_bad_run_is_a_row_and_is_tried_again(
     store.finish()
     table, totals = run_campaign(campaign, tmp_path / "s", 1)
     assert totals.runs_now == 1
-    assert table.equals(pq.read_table(finished / "results.parquet"))
+    assert pq.read_table(table.path).equals(pq.read_table(finished / "results.parquet"))
 
 
 def test_rows_say_which_program_made_them(

@@ -13,13 +13,12 @@ import importlib
 import logging
 import math
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
 from hil.core.errors import BadInput, RigFault
-from hil.study.campaign.workers import AHEAD, MOST_LOST
+from hil.study.campaign.workers import AHEAD, MOST_LOST, Waiting
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -66,7 +65,7 @@ def on_dask(
             raise BadInput(f"--dask {address}: no scheduler answers there ({error})") from None
         crew = _Crew(dask, client, address, say, f"import {', '.join(needed)}")
         try:
-            yield from crew.do(function, deque(jobs), lost)
+            yield from crew.do(function, Waiting(jobs), lost)
         finally:
             with suppress(Exception):  # the scheduler may be gone: nothing is left to be told
                 client.close(timeout=2)
@@ -101,7 +100,7 @@ class _Crew:
     def do(
         self,
         function: Callable[[Job], Result],
-        todo: deque[Job],
+        todo: Waiting[Job],
         lost: Callable[[Job, str], Result] | None,
     ) -> Iterator[Result]:
         """Yield results as they come, with some jobs ahead for each thread of the cluster."""
@@ -111,7 +110,7 @@ class _Crew:
             most = AHEAD * max(1, self._look())
             while todo and len(pending) < most:
                 # A job is not kept under a name made of its content: two campaigns may share jobs.
-                future = self._asked(self._client.submit, function, todo[0], pure=False)
+                future = self._asked(self._client.submit, function, todo.first, pure=False)
                 pending[future] = todo.popleft()
             for future in self._done(list(pending)):
                 job = pending.pop(future)

@@ -9,20 +9,23 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pyarrow as pa
 
 from hil.analysis.intervals import Interval
-from hil.analysis.stats import Paired, Tape, level, paired
+from hil.analysis.stats import Paired, level, paired
 from hil.report.arms import Arm, arm_names, law_rank
+from hil.study.campaign.merge import is_text
 from hil.study.campaign.plan import HOLDS, Campaign, metric_of
 
 if TYPE_CHECKING:
-    import pyarrow as pa
     from numpy.typing import NDArray
+
+    from hil.study.campaign.merge import Table
 
     Array = NDArray[np.float64]
 
@@ -45,9 +48,9 @@ class Outcomes:
     arms: tuple[Arm, ...]
     labels: tuple[str, ...]
     points: dict[str, NDArray[Any]]
-    figures: dict[str, Array]
+    figures: Mapping[str, Array]
     complete: NDArray[np.bool_]
-    tapes: tuple[Tape, ...]
+    tapes: NDArray[np.int64]  # pairs x (seed, draw)
 
     @property
     def numeric_axes(self) -> list[str]:
@@ -72,41 +75,68 @@ class Outcomes:
 
     def level(self, figure: str, arm: int, pairs: NDArray[np.intp]) -> tuple[float, Interval]:
         """Return an arm's mean over the pairs that have the figure, and its 95 % interval."""
-        return level(self.figures[figure][pairs, arm].tolist(), [self.tapes[i] for i in pairs])
+        return level(self.figures[figure][pairs, arm], self.tapes[pairs])
 
     def difference(self, figure: str, arm: int, pairs: NDArray[np.intp]) -> Paired:
         """Return the paired difference of an arm to the baseline."""
         values = self.figures[figure][pairs]
         return paired(
-            values[:, 0].tolist(),
-            values[:, arm].tolist(),
-            [self.tapes[i] for i in pairs],
+            values[:, 0],
+            values[:, arm],
+            self.tapes[pairs],
             shares=figure == HOLDS.name,
         )
 
 
-def outcomes_of(campaign: Campaign, table: pa.Table) -> Outcomes:
-    """Return a whole campaign's results as arrays."""
+class _Figures(Mapping[str, "Array"]):
+    """The figures of all runs by name, pairs x arms; each is read when it is asked for, and kept."""
+
+    def __init__(self, table: Table, order: list[int], names: tuple[str, ...]) -> None:
+        self._table = table
+        self._order = order
+        self._names = names
+        self._read: dict[str, Array] = {}
+
+    def __getitem__(self, name: str) -> Array:
+        """Return one figure, NaN where a run has none."""
+        if name not in self._read:
+            if name not in self._names:
+                raise KeyError(name)
+            values = self._table.column(name).cast("float64").to_numpy()
+            self._read[name] = values.reshape(-1, len(self._order))[:, self._order]
+        return self._read[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Return the names of all figures."""
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        """Return how many figures there are."""
+        return len(self._names)
+
+
+def outcomes_of(campaign: Campaign, table: Table) -> Outcomes:
+    """Return a whole campaign's results as arrays; of a table on disk only the columns that are used."""
     arms = list(itertools.product(campaign.file.outer, campaign.file.inner))
     order = sorted(range(len(arms)), key=lambda i: [law_rank(law) for law in arms[i]])
     names = arm_names([arms[i] for i in order])
     count = len(arms)
 
-    def by_pair(name: str) -> NDArray[Any]:
-        values: NDArray[Any] = table.column(name).to_numpy()
-        return values.reshape(-1, count)
+    def of_pairs(name: str) -> NDArray[Any]:
+        column = table.column(name)
+        firsts = column.take(pa.array(range(0, table.num_rows, count)))
+        values: NDArray[Any] = firsts.to_numpy()
+        return values
 
+    complete: NDArray[np.bool_] = is_text(table.column("outcome"), "complete").to_numpy()
     return Outcomes(
         campaign,
         tuple(arms[i] for i in order),
         tuple(names[arms[i]] for i in order),
-        {axis: by_pair(axis)[:, 0] for axis in campaign.axes},
-        {
-            name: by_pair(name).astype(np.float64)[:, order]
-            for name in (*campaign.figures, HOLDS.name)
-        },
-        (by_pair("outcome") == "complete")[:, order],
-        tuple(zip(by_pair("seed")[:, 0].tolist(), by_pair("draw")[:, 0].tolist(), strict=True)),
+        {axis: of_pairs(axis) for axis in campaign.axes},
+        _Figures(table, order, (*campaign.figures, HOLDS.name)),
+        complete.reshape(-1, count)[:, order],
+        np.column_stack([of_pairs("seed"), of_pairs("draw")]),
     )
 
 

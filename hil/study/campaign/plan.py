@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, overload
 
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 
@@ -217,18 +217,9 @@ class Campaign:
             for name, distribution in self.file.random.items()
         }
 
-    def jobs(self) -> list[Job]:
+    def jobs(self) -> Jobs:
         """Return all runs in their order; laws of one seed stand beside each other."""
-        file = self.file
-        seeds = range(file.seed, file.seed + file.seeds)
-        draws = [self.drawn(draw) for draw in range(file.draws)]
-        runs = itertools.product(
-            self.grid_points(), range(file.draws), seeds, file.outer, file.inner
-        )
-        return [
-            Job(index, tuple((point | draws[draw]).items()), draw, seed, outer, inner)
-            for index, (point, draw, seed, outer, inner) in enumerate(runs)
-        ]
+        return Jobs(self)
 
     def scenario(self, point: Sequence[tuple[str, Any]]) -> Scenario:
         """Return the scenario at a point; raises BadInput when a value is out of its bounds."""
@@ -238,6 +229,38 @@ class Campaign:
         scenario = build(Scenario, tree, self.file.name)
         check_board(scenario.board)
         return scenario
+
+
+class Jobs(Sequence[Job]):
+    """All runs of a campaign, each made when it is asked for: there may be a million."""
+
+    def __init__(self, campaign: Campaign) -> None:
+        file = campaign.file
+        self._points = campaign.grid_points()
+        self._draws = [campaign.drawn(draw) for draw in range(file.draws)]
+        self._seeds = range(file.seed, file.seed + file.seeds)
+        self._arms = list(itertools.product(file.outer, file.inner))
+
+    def __len__(self) -> int:
+        """Return how many runs there are."""
+        return len(self._points) * len(self._draws) * len(self._seeds) * len(self._arms)
+
+    @overload
+    def __getitem__(self, place: int) -> Job: ...
+    @overload
+    def __getitem__(self, place: slice) -> list[Job]: ...
+    def __getitem__(self, place: int | slice) -> Job | list[Job]:
+        """Return one run, or some."""
+        if isinstance(place, slice):
+            return [self._job(index) for index in range(len(self))[place]]
+        return self._job(range(len(self))[place])
+
+    def _job(self, index: int) -> Job:
+        rest, arm = divmod(index, len(self._arms))
+        rest, seed = divmod(rest, len(self._seeds))
+        point, draw = divmod(rest, len(self._draws))
+        values = self._points[point] | self._draws[draw]
+        return Job(index, tuple(values.items()), draw, self._seeds[seed], *self._arms[arm])
 
 
 def _unpickled(file: dict[str, Any], base: dict[str, Any], sources: Sources) -> Campaign:

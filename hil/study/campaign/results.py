@@ -12,7 +12,7 @@ import functools
 import json
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -23,8 +23,17 @@ import pyarrow.parquet as pq
 from hil import __version__
 from hil.core.errors import BadInput, RigFault
 from hil.core.figures import BY_NAME
-from hil.core.files import PART, replace_file, replacing
+from hil.core.files import PART, replace_file
 from hil.record.manifest import git_revision
+from hil.study.campaign.merge import (
+    Places,
+    Results,
+    Table,
+    group_count,
+    is_text,
+    read_group,
+    write_tables,
+)
 from hil.study.campaign.plan import Campaign, Job
 from hil.study.work_folder import LOCK, SET_ASIDE, is_new, set_aside
 
@@ -33,9 +42,11 @@ CAMPAIGN, PARTS, RESULTS, PAGE = "campaign.json", "parts", "results.parquet", "r
 # Outcome of a run that raised or killed its workers: no answer, and tried again when going on.
 ERROR = "error"
 _OURS = {CAMPAIGN, PARTS, RESULTS, PAGE, SET_ASIDE, LOCK}
-_PART_ROWS = 200
+# A part is written after so many rows, or as many seconds as work.py has it.
+_PART_ROWS = 2000
+_WHOSE = ("index", "outcome")
 _DIGEST = b"campaign_sha256"
-_UNKNOWN = "unknown"
+_COUNTED_ROWS = 1 << 16
 
 
 @functools.cache
@@ -76,11 +87,8 @@ class ResultStore:
         self._schema = schema_of(campaign)
         self._claim(campaign)
         self._rows: list[Row] = []
-        done = self.table()
-        outcomes = zip(
-            *(done.column(name).to_pylist() for name in ("index", "outcome")), strict=True
-        )
-        self.done: set[int] = {index for index, outcome in outcomes if outcome != ERROR}
+        self._runs = len(campaign.jobs())
+        self.done = self._places(names=self._schema.names).done
 
     def _claim(self, campaign: Campaign) -> None:
         """Make the folder, or take up this campaign's own; anything else is refused untouched."""
@@ -146,65 +154,72 @@ class ResultStore:
         if not self._rows:
             return
         name = f"{min(row['index'] for row in self._rows):09d}-{len(self._rows)}.parquet"
-        _write(self.folder / PARTS / name, pa.Table.from_pylist(self._rows, self._schema))
+        table = pa.Table.from_pylist(self._rows, self._schema)
+        _write(self.folder / PARTS / name, iter([table]), self._schema)
         self._rows.clear()
 
-    def table(self) -> pa.Table:
-        """Return every row on disk in the order of the campaign, each once.
+    def _places(self, names: Sequence[str] = _WHOSE) -> Places:
+        """Return where each row on disk is; those columns are read, and so checked.
 
         A file that cannot be read is set aside and noted: its rows are missing then.
         """
-        tables = [table for file in self._files() if (table := self._read(file)) is not None]
-        whole = pa.concat_tables(tables) if tables else self._schema.empty_table()
-        keep: dict[int, int] = {}
-        outcomes = whole.column("outcome").to_pylist()
-        for place, index in enumerate(whole.column("index").to_pylist()):
-            if index not in keep or outcomes[keep[index]] == ERROR:
-                keep[index] = place
-        return whole.take(pa.array([keep[index] for index in sorted(keep)], pa.int64()))
+        places = Places(self._runs)
+        for file in self._files():
+            try:
+                found = [self._whose(file, group, names) for group in range(group_count(file))]
+                for group, (index, again) in enumerate(found):
+                    places.add(file, group, index, again)
+            except (OSError, pa.ArrowException, KeyError, ValueError) as error:
+                aside = set_aside(file, self.folder)
+                self.notes.append(
+                    f"{file}: damaged ({str(error).partition(chr(10))[0]}); moved to {aside}, its "
+                    "rows are run again"
+                )
+        return places
 
-    def _read(self, file: Path) -> pa.Table | None:
-        try:
-            table = pq.ParquetFile(file, page_checksum_verification=True).read()
-            if "program" not in table.column_names:
-                names = pa.array([_UNKNOWN] * table.num_rows, pa.string())
-                table = table.append_column("program", names)
-            return table.select(self._schema.names).cast(self._schema)
-        except (OSError, pa.ArrowException, KeyError, ValueError) as error:
-            aside = set_aside(file, self.folder)
-            self.notes.append(
-                f"{file}: damaged ({str(error).partition(chr(10))[0]}); moved to {aside}, its rows "
-                "are run again"
-            )
-            return None
+    def _whose(
+        self, file: Path, group: int, names: Sequence[str]
+    ) -> tuple[pa.ChunkedArray, pa.ChunkedArray]:
+        """Return the rows' indices, and which are to be run again."""
+        table = read_group(file, group, self._schema, names)
+        return table.column("index"), is_text(table.column("outcome"), ERROR)
 
-    def finish(self) -> pa.Table:
+    def finish(self) -> Results:
         """Put all rows into one file and return them; the parts go."""
         self.flush()
-        table = self.table().combine_chunks()
-        _write(self.folder / RESULTS, table)
+        path = self.folder / RESULTS
+        _write(path, self._places().tables(self._schema), self._schema)
         for part in (self.folder / PARTS).iterdir():
             part.unlink()
         (self.folder / PARTS).rmdir()
-        return table
+        return Results(path)
 
 
-def programs(table: pa.Table) -> dict[str, int]:
+def programs(table: Table) -> dict[str, int]:
     """Return the programs that made the rows of a table, and how many each."""
-    return dict(Counter(table.column("program").to_pylist()))
+    return dict(_counted(table, ["program"]))
 
 
-def early_ends(table: pa.Table) -> dict[str, dict[str, Any]]:
+def early_ends(table: Table) -> dict[str, dict[str, Any]]:
     """Return how the runs without figures ended: by outcome their count and commonest cause."""
     ends: dict[str, Counter[str]] = {}
-    rows = zip(*(table.column(name).to_pylist() for name in ("outcome", "detail")), strict=True)
-    for outcome, detail in rows:
+    for (outcome, detail), count in _counted(table, ["outcome", "detail"]).items():
         if outcome != "complete":
-            ends.setdefault(outcome, Counter())[detail] += 1
+            ends.setdefault(outcome, Counter())[detail] += count
     return {
         outcome: {"runs": causes.total(), "commonest_cause": causes.most_common(1)[0][0]}
         for outcome, causes in ends.items()
     }
+
+
+def _counted(table: Table, names: Sequence[str]) -> Counter[Any]:
+    """Return how often each value, or each combination of several, is there, in order of the first."""
+    found: Counter[Any] = Counter()
+    columns = [table.column(name) for name in names]
+    for first in range(0, table.num_rows, _COUNTED_ROWS):
+        parts = [column.slice(first, _COUNTED_ROWS).to_pylist() for column in columns]
+        found.update(parts[0] if len(parts) == 1 else zip(*parts, strict=True))
+    return found
 
 
 def _programs_on_disk(path: Path) -> list[str]:
@@ -214,10 +229,14 @@ def _programs_on_disk(path: Path) -> list[str]:
         return []
 
 
-def _write(path: Path, table: pa.Table) -> None:
+def _write(path: Path, tables: Iterator[pa.Table], schema: pa.Schema) -> None:
     try:
-        with replacing(path) as part:
-            pq.write_table(table, part, compression="zstd", write_page_checksum=True)
+        write_tables(path, tables, schema)
+    except pa.ArrowException as error:
+        raise RigFault(
+            f"{path}: a part of the rows cannot be read any more ({str(error).partition(chr(10))[0]}); "
+            "the same command runs those again"
+        ) from None
     except OSError as error:
         raise RigFault(
             f"{path}: cannot be written: {error.strerror or error}; the rows before are kept, the "

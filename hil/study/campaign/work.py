@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from hil.config.fit import check_fit
 from hil.core.errors import BadInput, RigFault
 from hil.study.campaign.cluster import PROGRAM, on_dask
@@ -19,7 +21,7 @@ from hil.study.campaign.workers import in_processes
 from hil.study.work_folder import LOCK, is_new, sigterm_stops, sole_writer
 
 if TYPE_CHECKING:
-    import pyarrow as pa
+    from hil.study.campaign.merge import Results
 
 Progress = Callable[[int, int], None]
 _FLUSH_PERIOD_S = 15.0
@@ -116,7 +118,7 @@ def run_campaign(
     dask: str | None = None,
     progress: Progress | None = None,
     say: Callable[[str], None] = lambda _text: None,
-) -> tuple[pa.Table, Totals]:
+) -> tuple[Results, Totals]:
     """Do what is still to do of a campaign and return all its rows, sorted.
 
     `workers` processes of this machine (one a core), or the Dask cluster at address `dask`. `say`
@@ -141,11 +143,12 @@ def _go_on(
     dask: str | None,
     progress: Progress | None,
     say: Callable[[str], None],
-) -> tuple[pa.Table, Totals]:
+) -> tuple[Results, Totals]:
     for note in store.notes:
         say(note)
     jobs = campaign.jobs()
-    todo = [job for job in jobs if job.index not in store.done]
+    before = int(store.done.sum())
+    todo = (jobs[index] for index in np.flatnonzero(~store.done).tolist())
     count = workers or os.cpu_count() or 1
     worker = Worker(campaign)
     start_s = time.perf_counter()
@@ -169,8 +172,8 @@ def _go_on(
                 flushed_s = now_s
                 store.flush()
             if progress is not None:
-                progress(len(store.done) + number, len(jobs))
+                progress(before + number, len(jobs))
     finally:
         store.flush()
     wall_s = time.perf_counter() - start_s
-    return store.finish(), Totals(len(jobs), len(todo), None if dask else count, wall_s, busy_s)
+    return store.finish(), Totals(len(jobs), len(jobs) - before, None if dask else count, wall_s, busy_s)

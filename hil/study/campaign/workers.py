@@ -6,12 +6,13 @@ given to another. A job is a small picklable value; the function is one of this 
 
 from __future__ import annotations
 
+import itertools
 import multiprocessing
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, as_completed, wait
 from concurrent.futures.process import BrokenProcessPool
-from typing import Any, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 from hil.core.errors import RigFault
 from hil.study.workers import leave_ctrl_c_to_parent
@@ -28,6 +29,38 @@ _MOST_DEATHS = 5
 MOST_LOST = 3
 
 
+class Waiting(Generic[Job]):
+    """Jobs that wait: those given back first, then the others as they are asked for."""
+
+    def __init__(self, jobs: Iterable[Job]) -> None:
+        self._rest = iter(jobs)
+        self._front: deque[Job] = deque()
+
+    def ahead(self, most: int) -> int:
+        """Return how many wait, counted up to `most`."""
+        self._front.extend(itertools.islice(self._rest, max(most - len(self._front), 0)))
+        return len(self._front)
+
+    def __bool__(self) -> bool:
+        """Say whether one waits."""
+        return self.ahead(1) > 0
+
+    @property
+    def first(self) -> Job:
+        """The next one; there must be one."""
+        self.ahead(1)
+        return self._front[0]
+
+    def popleft(self) -> Job:
+        """Take the next one."""
+        self.ahead(1)
+        return self._front.popleft()
+
+    def appendleft(self, job: Job) -> None:
+        """Put one back to be the next."""
+        self._front.appendleft(job)
+
+
 def in_processes(
     function: Callable[[Job], Result],
     jobs: Iterable[Job],
@@ -40,12 +73,12 @@ def in_processes(
     `lost` makes its result of the job and the reason. Raises RigFault without `lost`, and when
     several jobs in a row are lost.
     """
-    todo, suspects = deque(jobs), deque[Job]()
+    todo, suspects = Waiting(jobs), Waiting[Job](())
     deaths: Counter[str] = Counter()
     lost_in_a_row = 0
     while todo or suspects:
         queue, most = (suspects, 1) if suspects else (todo, AHEAD * workers)
-        pool = _workers(min(workers, most, len(queue)))
+        pool = _workers(min(workers, most, queue.ahead(most)))
         running: dict[Future[Result], Job] = {}
         try:
             for result in _hand_out(pool, function, queue, running, most):
@@ -88,14 +121,14 @@ def _given_up(
 def _hand_out(
     pool: ProcessPoolExecutor,
     function: Callable[[Job], Result],
-    todo: deque[Job],
+    todo: Waiting[Job],
     running: dict[Future[Result], Job],
     most: int,
 ) -> Iterator[Result]:
     """Keep `most` jobs running until none is left; what is in `running` has not been yielded."""
     while todo or running:
         while todo and len(running) < most:
-            future = pool.submit(function, todo[0])  # raises when the pool is broken
+            future = pool.submit(function, todo.first)  # raises when the pool is broken
             running[future] = todo.popleft()
         done, _ = wait(running, return_when=FIRST_COMPLETED)
         for future in done:
