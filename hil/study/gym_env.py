@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import gymnasium
 import numpy as np
 
+from hil.analysis.costs import COST_WEIGHTS, USUAL, Cost
 from hil.config.fit import check_fit
 from hil.core.errors import BadInput, RigFault
 from hil.core.types import OuterCommand, wrap_pi
@@ -22,7 +23,6 @@ from hil.rigs.opening import is_simulated, open_rig, simulated_targets
 from hil.runs.execute import RunSpec, board_parameters, link_stats, make_manifest, make_parts
 from hil.runs.parts import Ending
 from hil.runs.session import Session
-from hil.study.costs import COST_WEIGHTS, USUAL, Cost
 from hil.wire.identity import board_hashes
 
 if TYPE_CHECKING:
