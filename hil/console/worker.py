@@ -17,6 +17,7 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from hil.config.fit import board_parameters
 from hil.console.folders import Folders
 from hil.console.hand_over import HandOver, floor_of
 from hil.console.orders import Order, order_of, spec_of
@@ -25,8 +26,9 @@ from hil.core.errors import HilError
 from hil.record.layout import MANIFEST
 from hil.record.reader import read_run
 from hil.record.schema import FRAME_NAMES
-from hil.runs.execute import exit_status, make_manifest
+from hil.runs.execute import exit_status
 from hil.runs.interruption import take_signals
+from hil.runs.provenance import make_manifest, used_things
 
 if TYPE_CHECKING:
     from hil.record.reader import RunRecord
@@ -125,7 +127,7 @@ def _run(order: Order, folders: Folders, hand_over: HandOver) -> RunRecord:
     from hil.runs.execute import execute  # noqa: PLC0415 - beside its first use
 
     spec = spec_of(order, folders)
-    manifest = make_manifest(spec)
+    manifest = make_manifest(spec, board_parameters(spec.scenario, spec.inner), used_things(spec))
     hand_over.say(
         begin={
             "record": folders.name_of(spec.out),

@@ -16,7 +16,7 @@ from hil.core.files import PART, replace_file
 from hil.record import layout
 from hil.record.camera import CameraKeeper
 from hil.record.journal import Columns, Journal, journal_to_parquet
-from hil.record.manifest import Manifest, Outcome, Plugin, file_entry, write_manifest
+from hil.record.manifest import Manifest, Outcome, file_entry, write_manifest
 from hil.record.reader import RunRecord, read_events, read_pictures
 from hil.record.schema import FRAME_COLUMNS, FRAME_NAMES, Column
 from hil.record.tape import TapeWriter
@@ -50,7 +50,6 @@ class Recorder:
         small_video: bool = False,
         frame_rate_hz: float = 30.0,
         rerun: bool = True,
-        plugins: Sequence[Plugin] = (),
     ) -> None:
         self.path = out_dir
         self._manifest = manifest
@@ -59,7 +58,7 @@ class Recorder:
         self._claim(out_dir)
         try:
             self._keeping.reserve()
-            self._open(plugins)
+            self._open()
         except OSError as error:
             raise self._keeping.fail(error) from None
         self._camera: CameraKeeper | None = None
@@ -72,9 +71,9 @@ class Recorder:
         self.link_frame = self._tlog.write
         self._put_manifest()
 
-    def _open(self, plugins: Sequence[Plugin]) -> None:
+    def _open(self) -> None:
         out_dir, keeping = self.path, self._keeping
-        self._keep(plugins)
+        self._keep_plugins()
         self._samples = Journal(
             out_dir / layout.SAMPLES_JOURNAL, self._manifest.sample_names, keeping
         )
@@ -101,9 +100,9 @@ class Recorder:
         except OSError as error:
             raise BadInput(f"--out {out_dir}: cannot be made: {error.strerror}") from None
 
-    def _keep(self, plugins: Sequence[Plugin]) -> None:
+    def _keep_plugins(self) -> None:
         """Write the text of every file that takes part."""
-        for plugin in plugins:
+        for plugin in self._manifest.plugins:
             if plugin.file:
                 path = self.path / plugin.file
                 path.parent.mkdir(exist_ok=True)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from hil.config.fit import board_parameters
 from hil.config.load import with_overrides
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput, RigFault
@@ -25,9 +26,12 @@ from hil.record.source import Source, load_plugins, read_source, recorded_scenar
 from hil.record.tlog import LoggedFrame
 from hil.replays.divergence import Channel, compare_columns, compare_link
 from hil.rigs.replay import HAPPENED, open_replay
-from hil.runs.execute import RunSpec, board_parameters, make_parts, trace_terms
+from hil.runs.assembly import make_parts
+from hil.runs.law_guard import make_law
 from hil.runs.parts import Ending
+from hil.runs.provenance import trace_terms
 from hil.runs.session import Session
+from hil.runs.spec import RunSpec
 from hil.wire.identity import board_hashes
 
 if TYPE_CHECKING:
@@ -124,7 +128,7 @@ def replay(
     terms = trace_terms(OUTER_LAWS.get(law))
     recorder = MemoryRecorder(source.manifest.model_copy(update={"trace": terms}), keep_link=True)
     rig = open_replay(source, recorded)
-    parts = make_parts(spec, rig, recorder)
+    parts = make_parts(spec, rig, recorder, make_law(spec.outer, spec.scenario))
     shadow = Shadow(parts.law, source.samples) if kind == "shadow" else None
     parts = replace(parts, law=shadow or parts.law)
     # The board's parameters are in the record whatever is changed here.

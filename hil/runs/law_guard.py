@@ -14,14 +14,18 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
+from hil.control.laws.hold import HoldAtGoal
+from hil.control.laws.making import make_outer_law
 from hil.core.errors import HilError, RigFault
-from hil.core.registry import in_one_line, place_of
+from hil.core.registries import OUTER_LAWS
+from hil.core.registry import BUILT_IN, in_one_line, place_of
 from hil.core.time_limit import TooLongError, time_limit
 from hil.core.types import OuterCommand
 from hil.core.wording import past
 
 if TYPE_CHECKING:
     from hil.config.control import OuterLimits
+    from hil.config.scenario import Scenario
     from hil.core.registry import Entry
     from hil.core.types import Estimate, OuterLaw, ReferenceState
 
@@ -91,3 +95,17 @@ class GuardedLaw:
 
     def _fault(self, said: str, error: BaseException | None = None) -> RigFault:
         return RigFault(f"law {self._entry.name} ({place_of(self._entry, error)}): {said}")
+
+
+def make_law(outer: str, scenario: Scenario) -> OuterLaw:
+    """Return the outer law of a run, guarded where it comes from outside.
+
+    Raises BadInput for an unknown one, RigFault for one that fails while it is made.
+    """
+    control, d0_m = scenario.control, scenario.robot.d0_m
+    entry, limits = OUTER_LAWS.get(outer), control.limits
+    if entry.origin == BUILT_IN:
+        return make_outer_law(outer, control.active_gains, limits, d0_m)
+    gains = control.active_gains.of(entry)
+    law = GuardedLaw(entry, lambda: entry.factory(gains, limits, d0_m), limits)
+    return HoldAtGoal(law, limits) if entry.extra.get("hold", True) else law

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from hil.core.registries import LOCALISERS
+from vision.spread import spread
 
 if TYPE_CHECKING:
     from hil.config.camera import CameraConfig
-    from vision.tracker import Localiser
+    from hil.core.types import Pose, PoseMeasurement
+    from vision.tracker import Image, Localiser
 
 
 def make_localiser(camera: CameraConfig) -> Localiser:
@@ -17,3 +19,26 @@ def make_localiser(camera: CameraConfig) -> Localiser:
     own = camera.own_settings
     made: Localiser = entry.factory(camera) if own is None else entry.factory(camera, own)
     return made
+
+
+def localiser_of_frames(camera: CameraConfig, *, drawn: bool) -> Localiser:
+    """Return the localiser of a run; raises BadInput.
+
+    Where poses are `drawn` its projections need not be worked out until an image comes after all.
+    """
+    return _WhenAsked(camera) if drawn else spread(make_localiser(camera))
+
+
+class _WhenAsked:
+    """The localiser of a run whose frames bring their poses: made when an image comes after all."""
+
+    def __init__(self, camera: CameraConfig) -> None:
+        self._camera = camera
+        self._made: Localiser | None = None
+
+    def locate(
+        self, image_bgr: Image, predicted: Pose | None, search_radius_m: float
+    ) -> PoseMeasurement:
+        """Return what the camera's localiser says."""
+        self._made = self._made or make_localiser(self._camera)
+        return self._made.locate(image_bgr, predicted, search_radius_m)

@@ -22,8 +22,8 @@ from hil.core.time_limit import TooLongError, time_limit
 from hil.core.types import OuterCommand, OuterLaw
 from hil.record.reader import RunRecord
 from hil.record.schema import LAW_COLUMNS, own_columns
-from hil.runs.execute import RunSpec, execute_in_memory, make_law
-from hil.runs.law_guard import STEP_MAX_S
+from hil.runs.execute import RunSpec, execute_in_memory
+from hil.runs.law_guard import STEP_MAX_S, make_law
 from hil.tools.conformance.floor import Episode, episodes, mirrored
 from hil.tools.conformance.report import Checks, Named, Report, Violation, entry_of
 from hil.tools.conformance.watch import Heard, require_no_clock, require_no_random, watch
@@ -361,7 +361,7 @@ def require_turned_fails(scenario: Scenario, outer: str) -> str:
     """Run a law with its turn the other way; raises Violation when that holds the scenario too."""
     spec = spec_of(scenario, outer)
     try:
-        record = execute_in_memory(spec, law=Turned(make_law(spec)))
+        record = execute_in_memory(spec, law=Turned(make_law(outer, scenario)))
     except RigFault as fault:
         return f"its turn the other way: {fault}"
     try:

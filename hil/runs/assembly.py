@@ -1,0 +1,54 @@
+"""The parts of a session, put together for a run."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from hil.config.limits import wheel_speed_max_rad_s
+from hil.control.estimators.making import make_estimator
+from hil.control.laws.turn_first import TurnFirst
+from hil.control.laws.within import WithinWheelSpeed
+from hil.control.references import make_reference
+from hil.control.vehicles.vehicle import make_vehicle
+from hil.core.clocks import CameraClock
+from hil.core.registries import OUTER_LAWS
+from hil.record.timeline import Timeline
+from hil.runs.parts import Parts
+from hil.wire.link import BoardLink
+from vision.localisers.making import localiser_of_frames
+
+if TYPE_CHECKING:
+    from hil.core.rig import Rig
+    from hil.core.types import OuterLaw
+    from hil.record.memory import RunSink
+    from hil.runs.spec import RunSpec
+
+
+def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw) -> Parts:
+    """Return the parts of a session over `rig` with its outer law; raises BadInput."""
+    scenario, control = spec.scenario, spec.scenario.control
+    vehicle = make_vehicle(scenario.robot)
+    timeline = Timeline(recorder, _unix_us)
+    return Parts(
+        rig=rig,
+        link=BoardLink(rig.stream, timeline.link_frame),
+        camera_clock=CameraClock(scenario.camera.latency_s),
+        localiser=localiser_of_frames(
+            scenario.camera, drawn=spec.camera == "pose" and spec.is_simulated
+        ),
+        estimator=make_estimator(control.estimator, control, vehicle.geometry),
+        law=TurnFirst(
+            WithinWheelSpeed(law, vehicle, wheel_speed_max_rad_s(scenario)),
+            control.limits.turn_missing_rad_s,
+        ),
+        reference=make_reference(scenario.reference),
+        vehicle=vehicle,
+        recorder=recorder,
+        timeline=timeline,
+        own_terms=tuple(OUTER_LAWS.get(spec.outer).trace),
+    )
+
+
+def _unix_us() -> int:
+    return time.time_ns() // 1000
