@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import shutil
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -198,6 +199,12 @@ class Recorder:
         )
         self._give_up(f"{before}{self._keeping.fault}")
         raise self._keeping.fault
+
+    def discard(self) -> None:
+        """Remove what was written: the folder was made, or found empty, for this record."""
+        with suppress(OSError, RecordFault):
+            self._stop_writers()
+        shutil.rmtree(self.path, ignore_errors=True)
 
     def _give_up(self, detail: str) -> None:
         """Leave what was written as it is, and say in the manifest how it ended, where that goes."""
