@@ -91,7 +91,7 @@ class RunRecord:
         """Return what a figure of merit is given of the run."""
         built_in = self._built_in()
         return metrics.RunData(
-            columns=own_figures.read_only(self.samples),
+            columns=own_figures.ReadOnly(self.samples),
             scenario=self.manifest.scenario,
             figures=dict(built_in.values),
             basis=built_in.basis,
