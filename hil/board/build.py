@@ -75,7 +75,10 @@ class Build:
 
 
 def find_toolchain() -> Toolchain:
-    """Return compiler and core from Debian's packages or an Arduino installation."""
+    """Return compiler and core from Debian's packages or an Arduino installation.
+
+    Raises BadInput, which names the packages, where one of them is missing.
+    """
     home = Path.home()
     arduino = [home / ".arduino15/packages", home / "Library/Arduino15/packages"]
     compilers = [Path(found).parent for found in [shutil.which("avr-gcc")] if found]

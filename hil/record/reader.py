@@ -214,7 +214,10 @@ def altered_files(path: Path, manifest: Manifest) -> list[str]:
 
 
 def read_table(path: Path, parquet: str, journal: str, *, required: bool) -> Columns:
-    """Return a table from its Parquet file, or from the journal that a crash left."""
+    """Return a table from its Parquet file, or from the journal that a crash left.
+
+    Raises BadInput where it is required and neither has a row.
+    """
     if (path / parquet).is_file():
         return read_parquet(path / parquet)
     if (path / journal).is_file():

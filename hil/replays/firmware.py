@@ -248,7 +248,10 @@ def read_reports(source: Source) -> tuple[Trace, dict[int, int]]:
 
 
 def sent_frames(source: Source, arrivals: Mapping[int, int]) -> list[Sent]:
-    """Return the host's frames in the order and at the times at which the board had them."""
+    """Return the host's frames in the order and at the times at which the board had them.
+
+    Raises BadInput where no wheel report names a set-point of the record.
+    """
     timed: list[tuple[int, int | None, bytes]] = []
     delays = []
     for logged in source.link:
