@@ -5,7 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -361,6 +364,31 @@ def test_an_environment_rewards_by_a_cost_of_ones_own(tmp_path: Path):
     assert rewards[:-1] == [0.0] * (len(rewards) - 1)
     assert -rewards[-1] == cost_of(str(cost)).of(info["figures"])
     assert -rewards[-1] < 50.0
+
+
+def test_an_installed_package_brings_both(tmp_path: Path):
+    """Entry points make the names known; a package that fails is told and breaks nothing."""
+    written(tmp_path / "goodlab.py", NEAR + "\n\n" + COST)
+    points = "[skid_steer_hil.figures]\ngoodlab = goodlab\nbadlab = no_such_module_of_badlab\n"
+    info = tmp_path / "goodlab-1.0.dist-info"
+    info.mkdir()
+    written(info / "METADATA", "Metadata-Version: 2.1\nName: goodlab\nVersion: 1.0\n")
+    written(
+        info / "entry_points.txt", f"{points}[skid_steer_hil.tuning_costs]\ngoodlab = goodlab\n"
+    )
+    code = (
+        "import json; from hil.core.registries import FIGURES, TUNING_COSTS as costs; "
+        "print(json.dumps([FIGURES.get('near').origin, costs.get('own-cost').origin, FIGURES.failed]))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    figure, cost, failed = json.loads(done.stdout)
+    assert figure == "package goodlab"
+    assert cost.endswith("goodlab")
+    assert failed == {"goodlab": "ModuleNotFoundError: No module named 'no_such_module_of_badlab'"}
 
 
 def test_a_figure_of_this_process_needs_no_file():
