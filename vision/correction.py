@@ -80,7 +80,10 @@ class CorrectedCamera(CameraModel):
 
 
 def corrected(camera: CameraModel, world_m: Array, px: Array, degree: int) -> CorrectedCamera:
-    """Return the camera with a shift fitted to points (N, 3) in m seen at pixels (N, 2)."""
+    """Return the camera with a shift fitted to points (N, 3) in m seen at pixels (N, 2).
+
+    Raises BadInput for a degree out of bounds, and for too few points.
+    """
     if not 1 <= degree <= DEGREE_MAX:
         raise BadInput(f"correction degree {degree}: the limit is 1 to {DEGREE_MAX}")
     terms = _monomials(px, camera.width_px, camera.height_px, degree)

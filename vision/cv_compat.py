@@ -69,6 +69,8 @@ def read_image(path: Path) -> Image:
     BadInput when it is missing, damaged, no image, or larger than a camera file can describe; that
     is seen in the file's header, before anything is decoded. OpenCV returns a grey-filled picture
     for a JPEG that was cut off, so the file's end is checked too.
+
+    Raises BadInput for a file that is no image.
     """
     try:
         data = path.read_bytes()

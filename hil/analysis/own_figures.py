@@ -6,7 +6,7 @@ One that raises, takes too long or gives no finite number has no value in that r
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,7 @@ from hil.core.registry import Entry, in_one_line, place_of
 from hil.core.time_limit import TooLongError, time_limit
 
 if TYPE_CHECKING:
-    from hil.analysis.metrics import Columns, RunData
+    from hil.analysis.metrics import Array, Columns, RunData
 
 # Longest that a figure may take, s: while a record is closed, Ctrl-C waits for it.
 TIME_MAX_S = 10.0
@@ -68,9 +68,22 @@ def _without(entry: Entry, said: str, error: BaseException | None = None) -> Bad
     )
 
 
-def read_only(columns: Columns) -> Columns:
-    """Return the columns as views that cannot be written to."""
-    found = {name: values.view() for name, values in columns.items()}
-    for values in found.values():
+class ReadOnly(Mapping[str, "Array"]):
+    """Columns that cannot be written to; those of a long run are read when they are asked for."""
+
+    def __init__(self, columns: Columns) -> None:
+        self._columns = columns
+
+    def __getitem__(self, name: str) -> Array:
+        """Return a column; raises KeyError."""
+        values = self._columns[name].view()
         values.flags.writeable = False
-    return found
+        return values
+
+    def __iter__(self) -> Iterator[str]:
+        """Yield the names."""
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        """Return how many columns there are."""
+        return len(self._columns)

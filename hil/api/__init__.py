@@ -197,7 +197,7 @@ def make_env(
         raise BadInput(
             f"make_env: {error.name} is not installed; pip install 'skid-steer-hil[gym]'"
         ) from None
-    from hil.study.costs import cost_of  # noqa: PLC0415
+    from hil.analysis.costs import cost_of  # noqa: PLC0415
 
     spec = _spec(load_scenario(scenario, **overrides), None, inner, on, camera, seed)
     return HilEnv(spec, cost_of(cost))

@@ -38,6 +38,10 @@ _STRICT = ("-Wall", "-Wextra", "-Werror")
 _SOURCES = {".ino", ".cpp", ".c", ".h", ".def"}
 
 
+# What writes a program to a board, in the order in which they are looked for.
+_PROGRAMMERS = ("avrdude", "arduino-cli")
+
+
 @dataclass(frozen=True, slots=True)
 class Toolchain:
     """Where the compiler and Arduino's core for AVR boards are."""
@@ -71,7 +75,10 @@ class Build:
 
 
 def find_toolchain() -> Toolchain:
-    """Return compiler and core from Debian's packages or an Arduino installation."""
+    """Return compiler and core from Debian's packages or an Arduino installation.
+
+    Raises BadInput, which names the packages, where one of them is missing.
+    """
     home = Path.home()
     arduino = [home / ".arduino15/packages", home / "Library/Arduino15/packages"]
     compilers = [Path(found).parent for found in [shutil.which("avr-gcc")] if found]
@@ -110,14 +117,23 @@ def _checkout() -> Path:
 
 
 def build(out: Path | None = None, *, fresh: bool = False) -> Build:
-    """Return the firmware built from the present sources; an up-to-date build is reused."""
+    """Return the firmware built from the present sources; an up-to-date build is reused.
+
+    Raises BadInput without a compiler, for a source that does not compile, and for a folder `out` that
+    cannot be made.
+    """
     tools, sketch = find_toolchain(), sketch_folder()
     out = out or build_folder(sketch)
     build_id = _build_id(tools, sketch)
     old = None if fresh else _read_report(out)
     if old is not None and old.build_id == build_id:
         return old
-    out.mkdir(parents=True, exist_ok=True)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInput(
+            f"--out {out}: cannot be made: {error.strerror}; name a folder that can be written to"
+        ) from None
     # Made aside and moved into place, so that a build under way elsewhere meets whole files only.
     with tempfile.TemporaryDirectory(dir=out) as folder:
         new = _compile(tools, sketch, Path(folder), build_id)
@@ -229,9 +245,7 @@ def upload(made: Build, port: str) -> None:
 
     Raises BadInput without a programmer or such a port, RigFault when the board does not answer.
     """
-    if not Path(port).exists() and not port.upper().startswith("COM"):
-        present = ", ".join(sorted(p.device for p in list_ports.comports())) or "none"
-        raise BadInput(f"port {port}: not there; ports on this machine: {present}")
+    require_upload(port)
     command = _upload_command(made, port)
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:
@@ -240,11 +254,18 @@ def upload(made: Build, port: str) -> None:
         raise RigFault(f"upload to {port} failed: {last}; is the board on that port?")
 
 
+def require_upload(port: str) -> None:
+    """Raise BadInput where nothing could be uploaded to `port`: no such port, or no programmer."""
+    if not Path(port).exists() and not port.upper().startswith("COM"):
+        present = ", ".join(sorted(p.device for p in list_ports.comports())) or "none"
+        raise BadInput(f"port {port}: not there; ports on this machine: {present}")
+    if not any(map(shutil.which, _PROGRAMMERS)):
+        raise BadInput(f"neither {' nor '.join(_PROGRAMMERS)} found; Debian: apt install avrdude")
+
+
 def _upload_command(made: Build, port: str) -> list[str]:
     if shutil.which("avrdude"):
         return ["avrdude", "-p", _MCU, "-c", "wiring", "-P", port, "-b", "115200", "-D",
                 "-U", f"flash:w:{made.hex}:i"]  # fmt: skip
-    if shutil.which("arduino-cli"):
-        return ["arduino-cli", "upload", "--fqbn", "arduino:avr:mega", "-p", port,
-                "--input-file", str(made.hex)]  # fmt: skip
-    raise BadInput("neither avrdude nor arduino-cli found; Debian: apt install avrdude")
+    return ["arduino-cli", "upload", "--fqbn", "arduino:avr:mega", "-p", port,
+            "--input-file", str(made.hex)]  # fmt: skip

@@ -122,7 +122,10 @@ class _Walk:
         self._under_way: list[int] = []
 
     def deepest(self, entry: int) -> tuple[int, tuple[str, ...]]:
-        """Return the most bytes below the return address of what is entered there, and the calls to it."""
+        """Return the most bytes below the return address of what is entered there, and the calls to it.
+
+        Raises BadInput for a function that calls itself, and a loop that takes more stack each time.
+        """
         if entry in self._known:
             return self._known[entry]
         name = self.lines[entry].symbol

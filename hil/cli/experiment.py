@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -25,6 +27,12 @@ from hil.cli.options import (
 )
 from hil.cli.progress import run_progress
 from hil.core.text import visible
+
+if TYPE_CHECKING:
+    from hil.record.reader import RunRecord
+    from hil.runs.spec import RunSpec
+    from hil.study.experiment import Study
+    from hil.study.until import Until
 
 UNTIL_MOST = 1000
 
@@ -78,20 +86,8 @@ def command(
     """
     from hil.config.deck import load_deck
     from hil.record.manifest import command_line
-    from hil.record.reader import read_run
-    from hil.report.html import write_report
-    from hil.report.paper import figures_kept
     from hil.runs.execute import exit_status, new_folder
-    from hil.study.experiment import (
-        REPORT,
-        Conditions,
-        circle_study,
-        claim,
-        deck_specs,
-        study_by_scenario,
-        writing,
-    )
-    from hil.study.side_by_side import run_all, run_name
+    from hil.study.experiment import REPORT, Conditions, deck_specs, study_by_scenario, writing
     from hil.study.until import Until
 
     overrides = with_figures(overrides, own_figures)
@@ -102,27 +98,11 @@ def command(
     specs = deck_specs(load_deck(deck, outers), conditions, folder)
     warn_unfinished({spec.scenario.name: spec.scenario for spec in specs}.values())
     with junit_file(junit, f"experiment.{deck}"), writing(folder):
-        for wanted in [specs] if until is None else until.parts(specs, seed, most):
-            todo = claim(folder, wanted, _say)
-            if len(todo) < len(wanted):
-                _say(f"{len(wanted) - len(todo)} of {len(wanted)} runs are there already")
-            with run_progress(
-                {run_name(spec): spec.scenario.duration_s for spec in todo}
-            ) as update:
-                run_all(todo, update)
-            records = [read_run(spec.out) for spec in wanted]
-            if until is not None and until.reached(records, _say):
-                break
+        parts = [specs] if until is None else until.parts(specs, seed, most)
+        records = _records(parts, folder, until)
     report = folder / REPORT
     studies = study_by_scenario(records)
-    with figures_kept(figures):
-        write_report(
-            report,
-            [item.comparison for item in studies],
-            command=conditions.command,
-            circle=circle_study(),
-            repeats=[item.repeats for item in studies if item.repeats],
-        )
+    _write(report, studies, conditions.command, figures)
     tell_ci(records, f"hil experiment {deck}", junit=junit, report=report)
     if as_json:
         print_json({"report": str(report), "comparisons": [item.to_json() for item in studies]})
@@ -131,6 +111,43 @@ def command(
             print_study(item)
         click.echo(f"report: {visible(str(report))}")
     return max(exit_status(record) for record in records)
+
+
+def _records(
+    parts: Iterable[Sequence[RunSpec]], folder: Path, until: Until | None
+) -> list[RunRecord]:
+    """Make the runs of one part after the other until `until` is reached; return all records."""
+    from hil.record.reader import read_run
+    from hil.study.experiment import claim
+    from hil.study.side_by_side import run_all, run_name
+
+    records: list[RunRecord] = []
+    for wanted in parts:
+        todo = claim(folder, wanted, _say)
+        if len(todo) < len(wanted):
+            _say(f"{len(wanted) - len(todo)} of {len(wanted)} runs are there already")
+        with run_progress({run_name(spec): spec.scenario.duration_s for spec in todo}) as update:
+            run_all(todo, update)
+        records = [read_run(spec.out) for spec in wanted]
+        if until is not None and until.reached(records, _say):
+            break
+    return records
+
+
+def _write(report: Path, studies: Sequence[Study], command_text: str, figures: Path | None) -> None:
+    """Write the report, and its figures where they are wanted."""
+    from hil.report.html import write_report
+    from hil.report.paper import figures_kept
+    from hil.study.experiment import circle_study
+
+    with figures_kept(figures):
+        write_report(
+            report,
+            [item.comparison for item in studies],
+            command=command_text,
+            circle=circle_study(),
+            repeats=[item.repeats for item in studies if item.repeats],
+        )
 
 
 def _say(text: str) -> None:

@@ -44,6 +44,7 @@ def upload(port: str) -> None:
     """Build the sketch and write it to the board on PORT."""
     from hil.board import build
 
+    build.require_upload(port)
     made = build.build()
     build.upload(made, port)
     click.echo(f"build {made.build_id} is on the board at {port}")

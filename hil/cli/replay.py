@@ -56,10 +56,7 @@ def command(
     the ELF that is uploaded to the board, under simavr. --fit answers in
     closed loop, on a twin whose parameters are fitted to RUN, with the residual of that fit.
     """
-    from hil.cli.progress import run_progress
-    from hil.record.manifest import read_manifest
     from hil.replays.elf import elf as elf_firmware
-    from hil.replays.exact import replay
     from hil.replays.firmware import core, replay_wheels
     from hil.replays.output import claim_folder, write_output
     from hil.replays.what_if import what_if
@@ -71,19 +68,10 @@ def command(
             ("set", overrides), ("recorded-code", recorded_code),
         ) if value]  # fmt: skip
         return _replay_imported(run, changed, out, as_json)
-    told = read_manifest(run).scenario.get("duration_s")
-    duration_s = float(told) if isinstance(told, int | float) else 0.0  # for the bar; replay checks
     through = elf_firmware() if elf else core()
     if out is not None:
         claim_folder(out)
-    with run_progress({run.name: duration_s}) as update:
-        report = replay(
-            run,
-            outer,
-            overrides,
-            lambda t_s: update(run.name, t_s),
-            recorded_code=recorded_code,
-        )
+    report = _host_loop(run, outer, overrides, recorded_code=recorded_code)
     board_changes = [text for text in overrides if text.startswith("board.")]
     asked = firmware or elf or inner or board_changes
     wheels = replay_wheels(run, inner, board_changes, through) if asked else None
@@ -103,6 +91,26 @@ def command(
         if answer is not None:
             click.echo(answer.text())
     return _status(report)
+
+
+def _host_loop(
+    run: Path, outer: str | None, overrides: tuple[str, ...], *, recorded_code: bool
+) -> ReplayReport:
+    """Replay through the host's loop, with a bar."""
+    from hil.cli.progress import run_progress
+    from hil.record.manifest import read_manifest
+    from hil.replays.exact import replay
+
+    told = read_manifest(run).scenario.get("duration_s")
+    duration_s = float(told) if isinstance(told, int | float) else 0.0  # for the bar; replay checks
+    with run_progress({run.name: duration_s}) as update:
+        return replay(
+            run,
+            outer,
+            overrides,
+            lambda t_s: update(run.name, t_s),
+            recorded_code=recorded_code,
+        )
 
 
 def _status(report: ReplayReport) -> int:

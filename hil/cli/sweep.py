@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from hil.cli.options import json_option, print_json, warn_unfinished
 from hil.core.text import visible
+
+if TYPE_CHECKING:
+    from hil.study.campaign.merge import Table
+    from hil.study.campaign.plan import Campaign
+    from hil.study.campaign.work import Totals
 
 
 @click.command("sweep")
@@ -40,7 +46,7 @@ def command(
     from hil.study.campaign.findings import documents, outcomes_of, sentences
     from hil.study.campaign.maps import write_page
     from hil.study.campaign.plan import load_campaign
-    from hil.study.campaign.results import PAGE, early_ends, programs
+    from hil.study.campaign.results import PAGE
     from hil.study.campaign.work import run_campaign
 
     campaign = load_campaign(file)
@@ -48,43 +54,57 @@ def command(
     folder = out or new_folder(f"sweep-{campaign.file.name}")
     with job_progress(campaign.file.name) as update:
         table, totals = run_campaign(campaign, folder, workers, dask, update, _say)
-    ends, made_by = early_ends(table), programs(table)
-    notes = [*ending_lines(ends, totals.runs), *program_lines(made_by)]
     outcomes = outcomes_of(campaign, table)
     page = folder / PAGE
-    write_page(page, outcomes, command_line(), [*notes, *(f"Made by {name}." for name in made_by)])
-    held = int(table.column("holds").to_numpy().sum())
-    early = sum(end["runs"] for end in ends.values())
-    status = 3 if {"fault", "error"} & set(ends) else int(held < totals.runs)
-    efficiency = totals.efficiency
-    document: dict[str, Any] = {
+    document = _document(campaign, totals, table, folder) | {"answers": list(documents(outcomes))}
+    notes = [*ending_lines(document["endings"], totals.runs), *program_lines(document["programs"])]
+    made = (f"Made by {name}." for name in document["programs"])
+    write_page(page, outcomes, command_line(), [*notes, *made])
+    if as_json:
+        print_json(document)
+    else:
+        _print(document, notes, sentences(outcomes))
+    if {"fault", "error"} & set(document["endings"]):
+        return 3
+    return int(document["requirements_hold"] < totals.runs)
+
+
+def _document(campaign: Campaign, totals: Totals, table: Table, folder: Path) -> dict[str, Any]:
+    """Return how a campaign went, for `--json`."""
+    from hil.study.campaign.results import PAGE, RESULTS, early_ends, programs
+
+    efficiency, ends = totals.efficiency, early_ends(table)
+    return {
         "campaign": campaign.file.name,
         "sha256": campaign.digest,
-        "results": str(folder / "results.parquet"),
-        "report": str(page),
+        "results": str(folder / RESULTS),
+        "report": str(folder / PAGE),
         "runs": totals.runs,
         "runs_now": totals.runs_now,
-        "requirements_hold": held,
-        "ended_early": early,
+        "requirements_hold": int(table.column("holds").to_numpy().sum()),
+        "ended_early": sum(end["runs"] for end in ends.values()),
         "wall_s": round(totals.wall_s, 3),
         "workers": totals.workers,
         "parallel_efficiency": round(efficiency, 4) if efficiency is not None else None,
         "endings": ends,
-        "programs": made_by,
-        "answers": list(documents(outcomes)),
+        "programs": programs(table),
     }
-    if as_json:
-        print_json(document)
-        return status
+
+
+def _print(document: dict[str, Any], notes: Sequence[str], found: Sequence[str]) -> None:
+    """Write the same for a person."""
+    efficiency, runs = document["parallel_efficiency"], document["runs"]
     told = f", {efficiency:.0%} of the workers' time spent on runs" if efficiency else ""
-    click.echo(f"{totals.runs} runs, {totals.runs_now} of them now in {totals.wall_s:.1f} s{told}")
-    click.echo(f"{held} of {totals.runs} runs met every requirement, {early} ended early")
+    click.echo(
+        f"{runs} runs, {document['runs_now']} of them now in {document['wall_s']:.1f} s{told}"
+    )
+    held, early = document["requirements_hold"], document["ended_early"]
+    click.echo(f"{held} of {runs} runs met every requirement, {early} ended early")
     for line in notes:
         click.echo(f"note: {visible(line)}")
-    for line in sentences(outcomes):
+    for line in found:
         click.echo(f"- {visible(line)}")
-    click.echo(f"results: {visible(document['results'])}\nreport: {visible(str(page))}")
-    return status
+    click.echo(f"results: {visible(document['results'])}\nreport: {visible(document['report'])}")
 
 
 def _say(text: str) -> None:

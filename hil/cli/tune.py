@@ -22,11 +22,11 @@ from hil.core.text import visible
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from hil.analysis.costs import Figures
     from hil.analysis.stats import Paired
     from hil.cli.progress import Stage
     from hil.config.gains import Gains
     from hil.core.figures import Metric
-    from hil.study.costs import Figures
     from hil.study.tune import Plan, Trial
     from hil.study.tune_work import Journal, Tasks
     from hil.study.tuning_verdict import Verdict
@@ -85,9 +85,9 @@ def command(
     minutes of two cores; a search that is interrupted keeps its runs in FILE.search, and the same command
     goes on.
     """
+    from hil.analysis.costs import cost_of
     from hil.core.errors import BadInput
     from hil.study.campaign.results import program
-    from hil.study.costs import cost_of
     from hil.study.tune import SEARCH, Plan, boxes_of, write_gain_set
     from hil.study.tune_work import Journal, identity_of, load_tasks
     from hil.study.work_folder import sigterm_stops, sole_writer

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from hil.board._firmware import ENCODER_COUNTS_1_S
-from hil.config.limits import board_defaults, board_table, check_board
+from hil.board.wheel_laws import WHEEL_LAWS
+from hil.config.limits import board_defaults, board_table, check_board, check_edges
 from hil.config.mismatch import true_robot
 from hil.core.errors import BadInput
 
@@ -27,6 +28,16 @@ def check_fit(scenario: Scenario) -> None:
     _check_counts(scenario, board)
     _check_board_pairs(scenario, board)
     _check_battery(scenario, board)
+
+
+def board_parameters(scenario: Scenario, inner: str) -> dict[str, float]:
+    """Return every board parameter as this run needs it; raises BadInput where the board cannot count."""
+    parameters = scenario.board | {
+        "ENC_COUNTS": float(scenario.robot.encoder_counts_per_turn),
+        "LAW": WHEEL_LAWS[inner],
+    }
+    check_edges(parameters)
+    return parameters
 
 
 def _check_counts(scenario: Scenario, board: Mapping[str, float]) -> None:

@@ -125,6 +125,8 @@ def read_tree(name_or_path: str, kind: str, above: tuple[str, ...] = ()) -> Tree
     """Return a file's tables laid over those of its `base`, robot and camera files filled in.
 
     `above` are the files that lie on this one.
+
+    Raises BadInput for a file that lies on itself, is not there, or is no TOML.
     """
     if name_or_path in above:
         raise BadInput(f"{name_or_path}: lies on itself: {' on '.join((*above, name_or_path))}")

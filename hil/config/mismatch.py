@@ -14,7 +14,10 @@ if TYPE_CHECKING:
 
 
 def true_robot(scenario: Scenario) -> RobotConfig:
-    """Return the robot as it really is: the believed one with the scenario's mismatch applied."""
+    """Return the robot as it really is: the believed one with the scenario's mismatch applied.
+
+    Raises BadInput for a key that is no number of the robot.
+    """
     if not scenario.mismatch:
         return scenario.robot
     tree = scenario.robot.model_dump()

@@ -20,6 +20,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NoReturn
 
+from hil.config.fit import board_parameters
 from hil.console.folders import Folders
 from hil.console.hand_over import HandOver, floor_of
 from hil.console.orders import Order, order_of, spec_of
@@ -29,9 +30,10 @@ from hil.core.registries import OUTER_LAWS
 from hil.record.layout import MANIFEST
 from hil.record.reader import read_run
 from hil.record.schema import FRAME_NAMES
-from hil.runs.execute import exit_status, make_manifest
+from hil.runs.execute import exit_status
 from hil.runs.interruption import take_signals
 from hil.runs.orders import ARM, OrderSource, change_of, step_of, tunables
+from hil.runs.provenance import make_manifest, used_things
 
 if TYPE_CHECKING:
     from hil.record.reader import RunRecord
@@ -151,7 +153,7 @@ def _run(order: Order, folders: Folders, hand_over: HandOver, commands: Commands
     from hil.runs.execute import execute  # noqa: PLC0415 - beside its first use
 
     spec = spec_of(order, folders)
-    manifest = make_manifest(spec)
+    manifest = make_manifest(spec, board_parameters(spec.scenario, spec.inner), used_things(spec))
     known, law = tunables(spec), OUTER_LAWS.get(spec.outer)
     commands.change = lambda key, value: change_of(known, law, key, value)
     hand_over.say(

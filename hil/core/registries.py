@@ -24,7 +24,7 @@ LOCALISERS = Registry("localiser", "skid_steer_hil.localisers", "vision.localise
 VEHICLES = Registry("vehicle", "skid_steer_hil.vehicles", "hil.control.vehicles")
 TARGETS = Registry("target", "skid_steer_hil.targets", "hil.rigs.targets")
 FIGURES = Registry("figure of merit", "skid_steer_hil.figures", "hil.analysis.metrics")
-TUNING_COSTS = Registry("tuning cost", "skid_steer_hil.tuning_costs", "hil.study.costs")
+TUNING_COSTS = Registry("tuning cost", "skid_steer_hil.tuning_costs", "hil.analysis.costs")
 
 # As `hil list` names them.
 BY_PLURAL = {

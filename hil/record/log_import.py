@@ -68,22 +68,29 @@ class Imported:
 
 
 def import_log(log: Path, mapping: Path | None, out: Path, command: str) -> Imported:
-    """Make a run record of a foreign log in the new folder `out`; raises BadInput."""
+    """Make a run record of a foreign log in the new folder `out`; raises BadInput.
+
+    Whatever stops it on the way (Ctrl-C, a full disk) leaves nothing in `out`: it is made of the log anew.
+    """
     settings = read_mapping(mapping)
     scenario = load_scenario(_beside(mapping, settings.scenario), settings.set)
     signals = read_log(log, settings)
     columns = _completed(signals, scenario)
     notes = (*signals.notes, *_doubts(columns), *_assumed(settings, scenario, columns["t_s"]))
     recorder = Recorder(out, _manifest(log, scenario, settings, command))
-    for t_s, frame in signals.frames:
-        recorder.link_frame(t_s, frame)
-    table = np.column_stack([columns[name] for name in SAMPLE_NAMES])
-    for row in table.tolist():
-        recorder.append(row)
-    recorder.event(0.0, "imported", f"{log.name}, {signals.t_s.size} rows")
-    for note in notes:
-        recorder.event(0.0, "note", note)
-    return Imported(recorder.close("complete", f"imported from {log.name}"), notes)
+    try:
+        for t_s, frame in signals.frames:
+            recorder.link_frame(t_s, frame)
+        table = np.column_stack([columns[name] for name in SAMPLE_NAMES])
+        for row in table.tolist():
+            recorder.append(row)
+        recorder.event(0.0, "imported", f"{log.name}, {signals.t_s.size} rows")
+        for note in notes:
+            recorder.event(0.0, "note", note)
+        return Imported(recorder.close("complete", f"imported from {log.name}"), notes)
+    except BaseException:
+        recorder.discard()
+        raise
 
 
 def read_log(log: Path, settings: LogMapping) -> Signals:

@@ -8,7 +8,7 @@ import json
 import platform
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
@@ -201,6 +201,15 @@ def write_manifest(folder: Path, manifest: Manifest, *, durable: bool = False) -
     """Write the manifest atomically: a reader sees the old one or the new one, whole."""
     text = manifest.model_dump_json(indent=1)
     replace_file(folder / layout.MANIFEST, text.encode() + b"\n", durable=durable)
+
+
+def keep_texts(folder: Path, plugins: Sequence[Plugin]) -> None:
+    """Write the text of every file that takes part into the record's folder; raises OSError."""
+    for plugin in plugins:
+        if plugin.file:
+            path = folder / plugin.file
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(plugin.text, encoding="utf-8")
 
 
 def read_manifest(folder: Path) -> Manifest:

@@ -99,7 +99,7 @@ class RunRecord:
         """Return what a figure of merit is given of the run."""
         built_in = self._built_in()
         return metrics.RunData(
-            columns=own_figures.read_only(self.samples),
+            columns=own_figures.ReadOnly(self.samples),
             scenario=self.manifest.scenario,
             figures=dict(built_in.values),
             basis=built_in.basis,
@@ -222,7 +222,10 @@ def altered_files(path: Path, manifest: Manifest) -> list[str]:
 
 
 def read_table(path: Path, parquet: str, journal: str, *, required: bool) -> Columns:
-    """Return a table from its Parquet file, or from the journal that a crash left."""
+    """Return a table from its Parquet file, or from the journal that a crash left.
+
+    Raises BadInput where it is required and neither has a row.
+    """
     if (path / parquet).is_file():
         return read_parquet(path / parquet)
     if (path / journal).is_file():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import shutil
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -12,12 +13,12 @@ from typing import TYPE_CHECKING
 
 from hil.analysis import metrics
 from hil.analysis.pieces import row_count
-from hil.core.errors import BadInput, RecordFault
+from hil.core.errors import RecordFault
 from hil.core.files import PART, replace_file
 from hil.record import layout
 from hil.record.camera import CameraKeeper
 from hil.record.journal import Columns, Journal, journal_to_parquet
-from hil.record.manifest import Manifest, Outcome, Plugin, file_entry, write_manifest
+from hil.record.manifest import Manifest, Outcome, file_entry, keep_texts, write_manifest
 from hil.record.reader import RunRecord, read_events, read_pictures
 from hil.record.schema import FRAME_COLUMNS, FRAME_NAMES, Column
 from hil.record.tape import TapeWriter
@@ -50,18 +51,23 @@ class Recorder:
         small_video: bool = False,
         frame_rate_hz: float = 30.0,
         rerun: bool = True,
-        plugins: Sequence[Plugin] = (),
     ) -> None:
         self.path = out_dir
         self._manifest = manifest
         self._rerun = rerun
-        self._keeping = Keeping(out_dir)
-        self._claim(out_dir)
+        self._keeping = keeping = Keeping.of_new_folder(out_dir)
         try:
-            self._keeping.reserve()
-            self._open(plugins)
+            keep_texts(out_dir, manifest.plugins)
+            self._samples = Journal(
+                out_dir / layout.SAMPLES_JOURNAL, manifest.sample_names, keeping
+            )
+            self._frames = Journal(out_dir / layout.FRAMES_JOURNAL, FRAME_NAMES, keeping)
+            self._tlog = TlogWriter(out_dir / layout.LINK, manifest.start_unix_us, keeping)
+            self.tape = TapeWriter(out_dir / layout.TAPE, keeping)
+            self._events = GuardedFile(out_dir / layout.EVENTS, keeping)
+            write_manifest(out_dir, manifest)
         except OSError as error:
-            raise self._keeping.fail(error) from None
+            raise keeping.fail(error) from None
         self._camera: CameraKeeper | None = None
         kept = layout.CAMERA_SMALL if small_video else layout.CAMERA
         self._video = out_dir / kept if record_camera or small_video else None
@@ -70,18 +76,6 @@ class Recorder:
         self._rows = 0
         self._write_row = self._samples.write
         self.link_frame = self._tlog.write
-        self._put_manifest()
-
-    def _open(self, plugins: Sequence[Plugin]) -> None:
-        out_dir, keeping = self.path, self._keeping
-        self._keep(plugins)
-        self._samples = Journal(
-            out_dir / layout.SAMPLES_JOURNAL, self._manifest.sample_names, keeping
-        )
-        self._frames = Journal(out_dir / layout.FRAMES_JOURNAL, FRAME_NAMES, keeping)
-        self._tlog = TlogWriter(out_dir / layout.LINK, self._manifest.start_unix_us, keeping)
-        self.tape = TapeWriter(out_dir / layout.TAPE, keeping)
-        self._events = GuardedFile(out_dir / layout.EVENTS, keeping)
 
     def _put_manifest(self) -> None:
         if self._keeping.fault is not None:
@@ -90,24 +84,6 @@ class Recorder:
             write_manifest(self.path, self._manifest)
         except OSError as error:
             raise self._keeping.fail(error, self.path / layout.MANIFEST) from None
-
-    @staticmethod
-    def _claim(out_dir: Path) -> None:
-        """Make the folder, or take an empty one; anything else is refused untouched."""
-        try:
-            out_dir.mkdir(parents=True, exist_ok=True)
-            if any(out_dir.iterdir()):
-                raise BadInput(f"--out {out_dir}: the folder is not empty; name a new one")
-        except OSError as error:
-            raise BadInput(f"--out {out_dir}: cannot be made: {error.strerror}") from None
-
-    def _keep(self, plugins: Sequence[Plugin]) -> None:
-        """Write the text of every file that takes part."""
-        for plugin in plugins:
-            if plugin.file:
-                path = self.path / plugin.file
-                path.parent.mkdir(exist_ok=True)
-                path.write_text(plugin.text, encoding="utf-8")
 
     def start(self, unix_us: int) -> None:
         """Take the wall time of t_s = 0, which dates every frame of link.tlog."""
@@ -199,6 +175,12 @@ class Recorder:
         )
         self._give_up(f"{before}{self._keeping.fault}")
         raise self._keeping.fault
+
+    def discard(self) -> None:
+        """Remove what was written: the folder was made, or found empty, for this record."""
+        with suppress(OSError, RecordFault):
+            self._stop_writers()
+        shutil.rmtree(self.path, ignore_errors=True)
 
     def _give_up(self, detail: str) -> None:
         """Leave what was written as it is, and say in the manifest how it ended, where that goes."""

@@ -11,7 +11,7 @@ import errno
 import os
 from contextlib import suppress
 from pathlib import Path
-from typing import IO
+from typing import IO, Self
 
 from hil.core.errors import BadInput, RecordFault
 
@@ -27,6 +27,25 @@ class Keeping:
         self._folder = folder
         self._reserve = folder / _RESERVE
         self.fault: RecordFault | None = None
+
+    @classmethod
+    def of_new_folder(cls, folder: Path) -> Self:
+        """Make the folder of a record, or take an empty one; anything else is refused untouched.
+
+        Raises BadInput, RecordFault.
+        """
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            if any(folder.iterdir()):
+                raise BadInput(f"--out {folder}: the folder is not empty; name a new one")
+        except OSError as error:
+            raise BadInput(f"--out {folder}: cannot be made: {error.strerror}") from None
+        keeping = cls(folder)
+        try:
+            keeping.reserve()
+        except OSError as error:
+            raise keeping.fail(error) from None
+        return keeping
 
     def fail(self, error: OSError, path: Path | None = None) -> RecordFault:
         """Note the first error, and return what is to be raised for it."""

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from hil.config.fit import board_parameters
 from hil.config.load import with_overrides
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput, RigFault
@@ -25,10 +26,12 @@ from hil.record.source import Source, load_plugins, read_source, recorded_scenar
 from hil.record.tlog import LoggedFrame
 from hil.replays.divergence import Channel, compare_columns, compare_link
 from hil.rigs.replay import HAPPENED, open_replay
-from hil.runs.execute import RunSpec, board_parameters, make_ordered_parts, trace_terms
+from hil.runs.assembly import make_ordered_parts
 from hil.runs.orders import OrderSource
 from hil.runs.parts import Ending
+from hil.runs.provenance import trace_terms
 from hil.runs.session import Session
+from hil.runs.spec import RunSpec
 from hil.wire.identity import board_hashes
 
 if TYPE_CHECKING:

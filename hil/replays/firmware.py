@@ -20,13 +20,13 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from hil.board._firmware import BUILD_ID, TICK_US, Board, parameter_hash
+from hil.config.fit import board_parameters
 from hil.config.limits import check_board
 from hil.config.load import build, set_value
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
 from hil.record import layout
 from hil.record.source import Source, read_source
-from hil.runs.execute import board_parameters
 from hil.wire import dialect
 from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM, FrameReader, FrameWriter
 from hil.wire.messages import is_arming, set_parameter_message
@@ -249,7 +249,10 @@ def read_reports(source: Source) -> tuple[Trace, dict[int, int]]:
 
 
 def sent_frames(source: Source, arrivals: Mapping[int, int]) -> list[Sent]:
-    """Return the host's frames in the order and at the times at which the board had them."""
+    """Return the host's frames in the order and at the times at which the board had them.
+
+    Raises BadInput where no wheel report names a set-point of the record.
+    """
     timed: list[tuple[int, int | None, bytes]] = []
     delays = []
     armed = False

@@ -20,11 +20,11 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from hil.board._firmware import PWM_TOP
+from hil.config.fit import board_parameters
 from hil.config.mismatch import true_robot
 from hil.core.errors import BadInput
 from hil.core.types import wrap_pi
 from hil.replays.firmware import Trace, decoded, read_reports, sent_frames
-from hil.runs.execute import board_parameters
 from hil.wire import dialect
 from hil.wire.framing import FrameWriter
 from hil.wire.identity import board_hashes

@@ -31,7 +31,10 @@ def _cell(value: object) -> object:
 
 
 def write_csv(path: Path, runs: Sequence[RunRecord]) -> None:
-    """Write who each run was and its figures in their own units; a missing figure is empty."""
+    """Write who each run was and its figures in their own units; a missing figure is empty.
+
+    Raises BadInput where the file cannot be written.
+    """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     found = [run.figures() for run in runs]

@@ -156,7 +156,10 @@ class _ReplayStream:
         return self._rig.take_bytes()
 
     def write(self, data: bytes) -> None:  # noqa: ARG002 - see the module
-        """Send nowhere; fail where the recorded port failed, and after the record's end."""
+        """Send nowhere; fail where the recorded port failed, and after the record's end.
+
+        Raises RigFault there.
+        """
         self._rig.raise_recorded(tape.IN_WRITE)
         if self._rig.ended:
             raise RigFault(END)

@@ -13,16 +13,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import gymnasium
 import numpy as np
 
-from hil.config.fit import check_fit
+from hil.analysis.costs import COST_WEIGHTS, USUAL, Cost
+from hil.config.fit import board_parameters, check_fit
 from hil.core.errors import BadInput, RigFault
 from hil.core.types import OuterCommand, wrap_pi
 from hil.record.memory import MemoryRecorder
 from hil.record.schema import SAMPLE_NAMES
 from hil.rigs.opening import is_simulated, open_rig, simulated_targets
-from hil.runs.execute import RunSpec, board_parameters, link_stats, make_manifest, make_parts
+from hil.runs.assembly import make_parts
+from hil.runs.execute import RunSpec, link_stats
 from hil.runs.parts import Ending
+from hil.runs.provenance import make_manifest, used_things
 from hil.runs.session import Session
-from hil.study.costs import COST_WEIGHTS, USUAL, Cost
 from hil.wire.identity import board_hashes
 
 if TYPE_CHECKING:
@@ -180,7 +182,9 @@ class _Episode:
         self.seed = spec.seed
         self._cost = cost
         parameters = board_parameters(spec.scenario, spec.inner)
-        manifest = make_manifest(spec).model_copy(update={"outer": OUTER, "plugins": []})
+        manifest = make_manifest(spec, parameters, used_things(spec)).model_copy(
+            update={"outer": OUTER, "plugins": []}
+        )
         self._recorder = MemoryRecorder(manifest)
         self._law = GivenCommand()
         self._rig: Rig = open_rig(spec.target, spec.scenario, spec.camera, spec.seed)

@@ -86,7 +86,10 @@ def _stands_on_block(entry: Entry) -> bool:
 def run_without(
     scenario: Scenario, outer: str, seed: int, without: str = ""
 ) -> dict[str, float] | None:
-    """Return the figures of one run with a part of the law off; None where it ends early."""
+    """Return the figures of one run with a part of the law off; None where it ends early.
+
+    Raises BadInput for a part that the law does not have.
+    """
     from hil.runs.execute import RunSpec, execute_in_memory  # noqa: PLC0415
 
     if without and without not in parts_of(outer):

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from hil.analysis.costs import USUAL, Cost, Figures
 from hil.config.control import PointReference
 from hil.config.events import Disturbance
 from hil.config.load import load_robot, load_scenario
@@ -23,7 +24,6 @@ from hil.core.files import replace_file
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import Box
 from hil.core.types import wrap_pi
-from hil.study.costs import USUAL, Cost, Figures
 from hil.study.directions import in_drawn_axes
 
 if TYPE_CHECKING:
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 Evaluate = Callable[[Sequence["Trial"]], Sequence[Figures]]
 # (candidates done, best cost so far)
 Progress = Callable[[int, float], None]
+
 
 def boxes_of(laws: Sequence[str]) -> dict[str, Box]:
     """Return what is searched of each law, as the law declares it; raises BadInput for one without."""

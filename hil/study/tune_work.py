@@ -16,6 +16,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import IO, Any, Self
 
+from hil.analysis.costs import COST_WEIGHTS, Figures
 from hil.config.control import ControlConfig, PointReference
 from hil.config.deck import CALM, Cell, Deck, load_deck
 from hil.config.gains import Gains, only_gains_of
@@ -24,7 +25,6 @@ from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
 from hil.core.files import read_toml
 from hil.core.registries import OUTER_LAWS, TUNING_COSTS, source_digests
-from hil.study.costs import COST_WEIGHTS, Figures
 from hil.study.suite import refuse_seen, spread_over
 from hil.study.tune import (
     CASES,

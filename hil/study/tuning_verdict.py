@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from hil.analysis.costs import USUAL as USUAL_COST
+from hil.analysis.costs import Cost, Figures
 from hil.analysis.stats import Paired, paired
 from hil.core.errors import BadInput
-from hil.study.costs import USUAL as USUAL_COST
-from hil.study.costs import Cost, Figures
 from hil.study.tune import Case, Plan, Trial
 
 if TYPE_CHECKING:

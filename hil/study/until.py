@@ -45,7 +45,10 @@ class Until:
             yield [spec for spec in specs if spec.seed < seed + count]
 
     def reached(self, records: Sequence[RunRecord], say: Callable[[str], None]) -> bool:
-        """Say whether every paired difference is known narrowly enough; `say` is told how it stands."""
+        """Say whether every paired difference is known narrowly enough; `say` is told how it stands.
+
+        Raises BadInput where there are no two laws to compare.
+        """
         tables = _values(records, self.figure)
         wide = [
             f"{scenario}: {' over '.join(arm)}"

@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from hil.analysis.costs import COST_FAILED
 from hil.core.registry import Box
-from hil.study.costs import COST_FAILED
 from hil.study.tune import Found, minimise
 from hil.study.wheel_bench import CASES, DEFAULT, Case, figures, run
 

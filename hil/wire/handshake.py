@@ -45,6 +45,8 @@ def connect(link: BoardLink, parameters: Mapping[str, float]) -> Procedure:
 
     Afterwards `link.info` and `link.parameters` are the board's own account of itself. A board
     whose parameter hash is that of `parameters` has them all, and they are not fetched.
+
+    Raises RigFault when none answers, or it speaks another dialect.
     """
     if not (yield from _wait(link, lambda: link.heartbeats > 0, _FIRST_HEARTBEAT_S)):
         raise RigFault(
@@ -156,6 +158,8 @@ def store(link: BoardLink) -> Procedure:
     """Keep the parameters in force in the board's EEPROM; ends when the last byte is written.
 
     A board that was reset meanwhile has other parameters in force, and stored: RigFault.
+
+    Raises RigFault when the board does not say that it did.
     """
     yield from read_info(link)
     complete = len(link.parameters) == link.parameter_count > 0

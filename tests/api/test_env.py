@@ -11,8 +11,8 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import SyncVectorEnv
 
 import hil
+from hil.analysis.costs import COST_FAILED, USUAL
 from hil.record.schema import SAMPLE_NAMES
-from hil.study.costs import COST_FAILED, USUAL
 from hil.study.gym_env import OBSERVATION, HilEnv
 
 LAW = '''

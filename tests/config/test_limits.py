@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from hil.config.fields import Setting
 from hil.config.fields import settings as settings_of
-from hil.config.fit import check_fit
+from hil.config.fit import board_parameters, check_fit
 from hil.config.limits import board_table, check_board
 from hil.config.load import build, load_scenario, put_value
 from hil.config.robot import RobotConfig
@@ -24,7 +24,7 @@ from hil.control.laws.within import WithinWheelSpeed
 from hil.core.errors import BadInput
 from hil.core.types import Estimate, OuterCommand, Pose, ReferenceState
 from hil.record.reader import RunRecord
-from hil.runs.execute import RunSpec, board_parameters, execute_in_memory
+from hil.runs.execute import RunSpec, execute_in_memory
 from hil.wire.link import StatusText
 from hil.wire.refusal import refused_set_point
 from tests.system.random_runs import problems
@@ -106,7 +106,7 @@ def test_a_set_point_that_the_board_refuses_is_said_by_its_name(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Without the scaling the run stops at the refusal, and not 250 ms later by a time-out."""
-    monkeypatch.setattr("hil.runs.execute.wheel_speed_max_rad_s", lambda _: math.inf)
+    monkeypatch.setattr("hil.runs.assembly.wheel_speed_max_rad_s", lambda _: math.inf)
     record = run(load_scenario("scenario-1", SMALL_WHEELS))
     assert record.manifest.outcome == "fault"
     assert "set-point refused: above W_MAX" in record.manifest.outcome_detail

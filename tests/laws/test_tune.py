@@ -6,10 +6,10 @@ from collections import Counter
 
 import pytest
 
+from hil.analysis.costs import COST_FAILED, COST_WEIGHTS, USUAL
 from hil.config.control import ControlConfig
 from hil.config.gains import Gains
 from hil.config.load import load_scenario
-from hil.study.costs import COST_FAILED, COST_WEIGHTS, USUAL
 from hil.study.tune import (
     CASES,
     PUSHES,

@@ -5,11 +5,11 @@ import math
 
 import pytest
 
+from hil.analysis.costs import USUAL
 from hil.config.deck import Cell, Deck, load_deck
 from hil.config.load import load_scenario
 from hil.control.references import make_reference, unfinished
 from hil.core.errors import BadInput
-from hil.study.costs import USUAL
 from hil.study.experiment import Conditions, deck_specs
 from hil.study.suite import (
     FAILED,

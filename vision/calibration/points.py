@@ -42,7 +42,10 @@ class PointPairs:
 
 
 def read_pairs(path: Path) -> PointPairs:
-    """Return the pairs of a CSV with columns x_m, y_m, u_px, v_px and, if wanted, z_m."""
+    """Return the pairs of a CSV with columns x_m, y_m, u_px, v_px and, if wanted, z_m.
+
+    Raises BadInput for a file without points.
+    """
     rows = read_numbers(path, ("x_m", "y_m", "u_px", "v_px"), ("z_m",))
     if not rows:
         raise BadInput(f"{path}: no points in it")
@@ -53,7 +56,10 @@ def read_pairs(path: Path) -> PointPairs:
 
 
 def pairs_of_board(board: Board, view: BoardView, place: Place) -> PointPairs:
-    """Return a board's corners as floor points, the board lying flat at `place`."""
+    """Return a board's corners as floor points, the board lying flat at `place`.
+
+    Raises BadInput for a board that looks the same upside down.
+    """
     if isinstance(board, Chessboard) and not board.one_way_up:
         raise BadInput(
             f"floor: a chessboard of {board.columns} x {board.rows} squares looks the same upside"
@@ -68,7 +74,10 @@ def pairs_of_board(board: Board, view: BoardView, place: Place) -> PointPairs:
 
 
 def pairs_of_fiducials(image: Image, name: str, table: Path, dictionary: str) -> PointPairs:
-    """Return the centres of tags seen, by a CSV with columns id, x_m, y_m and, if wanted, z_m."""
+    """Return the centres of tags seen, by a CSV with columns id, x_m, y_m and, if wanted, z_m.
+
+    Raises BadInput that names the tags of the table which are not seen.
+    """
     rows = read_numbers(table, ("id", "x_m", "y_m"), ("z_m",))
     places = {int(row["id"]): (row["x_m"], row["y_m"], row.get("z_m", 0.0)) for row in rows}
     found, corners = cv_compat.detect_tags(cv_compat.tag_detector(dictionary, refine=True), image)

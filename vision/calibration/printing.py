@@ -177,7 +177,10 @@ def _pdf_file(objects: list[bytes]) -> bytes:
 
 
 def write_sheet(path: Path, sheet: Sheet) -> None:
-    """Write the sheet as SVG or PDF, by the file's ending."""
+    """Write the sheet as SVG or PDF, by the file's ending.
+
+    Raises BadInput for another ending.
+    """
     kind = path.suffix.lower()
     if kind == ".svg":
         write_atomic(path, to_svg(sheet).encode("utf-8"))

@@ -17,7 +17,10 @@ WHITE, BLACK, RESET = "\x1b[107m\x1b[2J", "\x1b[40m\x1b[2J", "\x1b[0m\x1b[2J\x1b
 
 
 def watch_blinking_terminal(index: int) -> tuple[list[float], list[float], list[float]]:
-    """Blink and watch; return switching times, frame arrivals (host, s) and brightness (DN)."""
+    """Blink and watch; return switching times, frame arrivals (host, s) and brightness (DN).
+
+    Raises BadInput where stderr is no terminal.
+    """
     if not sys.stderr.isatty():
         raise BadInput("latency: stderr is no terminal, so there is nothing to blink with")
     camera = LiveCamera(index)

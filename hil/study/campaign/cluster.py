@@ -103,7 +103,10 @@ class _Crew:
         todo: Waiting[Job],
         lost: Callable[[Job, str], Result] | None,
     ) -> Iterator[Result]:
-        """Yield results as they come, with some jobs ahead for each thread of the cluster."""
+        """Yield results as they come, with some jobs ahead for each thread of the cluster.
+
+        Raises RigFault when the cluster goes away.
+        """
         pending: dict[Any, Job] = {}
         lost_in_a_row = 0
         while todo or pending:

@@ -29,7 +29,10 @@ def refuse_used(folder: Path) -> None:
 
 
 def write_all(folder: Path, sections: Sequence[Section], command: str) -> Path:
-    """Write report.html and the CSV tables into a folder; return the report's path."""
+    """Write report.html and the CSV tables into a folder; return the report's path.
+
+    Raises BadInput where the folder cannot be written to.
+    """
     report = folder / "report.html"
     try:
         folder.mkdir(parents=True, exist_ok=True)

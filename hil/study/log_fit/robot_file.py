@@ -52,7 +52,10 @@ def _below(file: Path) -> str:
 
 
 def write_robot_file(file: Path, believed: str, fit: LogFit) -> Path | None:
-    """Write the file in one step; return where a file that stood there is kept, None if none did."""
+    """Write the file in one step; return where a file that stood there is kept, None if none did.
+
+    Raises BadInput where it cannot be written.
+    """
     kept = None
     if Path(believed).is_file() and file.is_file() and file.samefile(believed):
         kept = _free_name(file)

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hil.analysis.costs import Cost
 from hil.analysis.own_figures import value_of
 from hil.config.load import load_scenario
 from hil.core.figures import BY_NAME, declared
 from hil.core.registries import FIGURES, TUNING_COSTS
 from hil.core.registry import Entry, in_one_line, place_of
-from hil.runs.execute import execute_in_memory, make_law
-from hil.study.costs import Cost
+from hil.runs.execute import execute_in_memory
+from hil.runs.law_guard import make_law
 from hil.tools.conformance.laws import SCENARIO, Turned, spec_of
 from hil.tools.conformance.report import Checks, Named, Report, Violation, entry_of
 from hil.tools.conformance.watch import Heard, require_no_clock, require_no_random, watch
@@ -106,7 +107,7 @@ def _runs(scenario: str, overrides: Sequence[str]) -> _Runs:
     resolved = load_scenario(scenario, overrides)
     specs = [spec_of(resolved, law) for law in _LAWS]
     good = tuple(execute_in_memory(spec) for spec in specs)
-    turned = execute_in_memory(specs[0], law=Turned(make_law(specs[0])))
+    turned = execute_in_memory(specs[0], law=Turned(make_law(specs[0].outer, specs[0].scenario)))
     return _Runs(good, turned)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -22,8 +22,8 @@ from hil.core.time_limit import TooLongError, time_limit
 from hil.core.types import OuterCommand, OuterLaw
 from hil.record.reader import RunRecord
 from hil.record.schema import LAW_COLUMNS, own_columns
-from hil.runs.execute import RunSpec, execute_in_memory, make_law
-from hil.runs.law_guard import STEP_MAX_S
+from hil.runs.execute import RunSpec, execute_in_memory
+from hil.runs.law_guard import STEP_MAX_S, make_law
 from hil.tools.conformance.floor import Episode, episodes, mirrored
 from hil.tools.conformance.report import Checks, Named, Report, Violation, entry_of
 from hil.tools.conformance.watch import Heard, require_no_clock, require_no_random, watch
@@ -125,19 +125,33 @@ def _on_the_twin(checks: Checks, bench: Bench) -> None:
 
 def commands(law: OuterLaw, episode: Episode, dt_s: float) -> list[OuterCommand]:
     """Return what a law commands along an episode from its reset on; raises Violation."""
-    try:
-        with time_limit(STEP_MAX_S):
-            law.reset(episode.references[0], episode.estimates[0])
-        out: list[Any] = []
-        for reference, estimate in zip(episode.references, episode.estimates, strict=True):
-            with time_limit(STEP_MAX_S):
-                out.append(law.step(reference, estimate, dt_s))
-    except TooLongError:
-        raise Violation(f"took longer than {STEP_MAX_S:g} s; a run is stopped for that") from None
+    out = list(_limited(_steps_of(law, episode, dt_s)))
     for command in out:
         if not isinstance(command, OuterCommand):
             raise Violation(f"step returned {type(command).__name__}, an OuterCommand is needed")
     return out
+
+
+def _steps_of(law: OuterLaw, episode: Episode, dt_s: float) -> Iterator[Any]:
+    """Yield what a law gives along an episode, from its reset on."""
+    law.reset(episode.references[0], episode.estimates[0])
+    for reference, estimate in zip(episode.references, episode.estimates, strict=True):
+        yield law.step(reference, estimate, dt_s)
+
+
+def _limited(steps: Iterator[Any]) -> Iterator[Any]:
+    """Yield the same; raises Violation where one takes longer than a run would let it."""
+    while True:
+        try:
+            with time_limit(STEP_MAX_S):
+                given = next(steps)
+        except StopIteration:
+            return
+        except TooLongError:
+            raise Violation(
+                f"a step took longer than {STEP_MAX_S:g} s; a run is stopped for that"
+            ) from None
+        yield given
 
 
 def _bits(command: OuterCommand) -> tuple[Any, ...]:
@@ -165,15 +179,11 @@ def _step_time(bench: Bench) -> str:
     law, dt_s = bench.make(), bench.dt_s
     taken_s = []
     for episode in bench.episodes:
-        law.reset(episode.references[0], episode.estimates[0])
-        for reference, estimate in zip(episode.references, episode.estimates, strict=True):
-            began_s = time.perf_counter()
-            try:
-                with time_limit(STEP_MAX_S):
-                    law.step(reference, estimate, dt_s)
-            except TooLongError:
-                raise Violation(f"a step took longer than {STEP_MAX_S:g} s") from None
-            taken_s.append(time.perf_counter() - began_s)
+        began_s = time.perf_counter()
+        for _ in _limited(_steps_of(law, episode, dt_s)):
+            now_s = time.perf_counter()
+            taken_s.append(now_s - began_s)
+            began_s = now_s
     median_s = float(np.median(taken_s))
     said = f"{median_s * 1e3:.3f} ms (median), tick {dt_s * 1e3:.1f} ms"
     if median_s > STEP_SHARE * dt_s:
@@ -250,13 +260,8 @@ def _shared(bench: Bench) -> str:
     """Step two instances in turns, on different episodes; each must be as when alone."""
     first, second = bench.episodes[0], bench.episodes[1]
     alone = [commands(bench.make(), episode, bench.dt_s) for episode in (first, second)]
-    laws = [bench.make(), bench.make()]
-    turns: list[list[OuterCommand]] = [[], []]
-    for law, episode in zip(laws, (first, second), strict=True):
-        law.reset(episode.references[0], episode.estimates[0])
-    for tick in range(min(len(first.estimates), len(second.estimates))):
-        for out, law, episode in zip(turns, laws, (first, second), strict=True):
-            out.append(law.step(episode.references[tick], episode.estimates[tick], bench.dt_s))
+    steps = [_steps_of(bench.make(), episode, bench.dt_s) for episode in (first, second)]
+    turns = [list(given) for given in zip(*zip(*steps, strict=False), strict=True)]
     for one, two, episode in zip(alone, turns, (first, second), strict=True):
         _require_same(one[: len(two)], two, episode, "alone, and in turns with another instance")
     return "two instances in turns are as each alone"
@@ -266,9 +271,8 @@ def _no_clock(bench: Bench, heard: Heard) -> str:
     with watch(heard):
         law = bench.make()
         for episode in bench.episodes:
-            law.reset(episode.references[0], episode.estimates[0])
-            for reference, estimate in zip(episode.references, episode.estimates, strict=True):
-                law.step(reference, estimate, bench.dt_s)
+            for _ in _steps_of(law, episode, bench.dt_s):
+                pass
     return require_no_clock(heard, "time is the argument dt_s, and t_host_s")
 
 
@@ -361,7 +365,7 @@ def require_turned_fails(scenario: Scenario, outer: str) -> str:
     """Run a law with its turn the other way; raises Violation when that holds the scenario too."""
     spec = spec_of(scenario, outer)
     try:
-        record = execute_in_memory(spec, law=Turned(make_law(spec)))
+        record = execute_in_memory(spec, law=Turned(make_law(outer, scenario)))
     except RigFault as fault:
         return f"its turn the other way: {fault}"
     try:

@@ -1,0 +1,98 @@
+"""What made a run, for its record: every value, every text from outside, versions and revision."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hil.config.robot import BUILT_IN_PLANT
+from hil.control.task_notes import notes
+from hil.core.figures import metric_of
+from hil.core.registries import ESTIMATORS, FIGURES, LOCALISERS, OUTER_LAWS, REFERENCES, VEHICLES
+from hil.core.registry import BUILT_IN, Entry, SourceText
+from hil.record.manifest import (
+    FigureTerm,
+    Manifest,
+    Plugin,
+    TraceTerm,
+    collect_versions,
+    git_revision,
+)
+from hil.record.schema import own_columns
+from hil.rigs.opening import REPLAY
+
+if TYPE_CHECKING:
+    from hil.runs.spec import RunSpec
+
+# Things in use, each with its kind.
+Used = Sequence[tuple[str, Entry]]
+
+
+def used_things(spec: RunSpec) -> list[tuple[str, Entry]]:
+    """Return what the registries gave for a run, each with its kind; raises BadInput."""
+    scenario = spec.scenario
+    used = (
+        (OUTER_LAWS, spec.outer),
+        (ESTIMATORS, scenario.control.estimator),
+        (LOCALISERS, scenario.camera.localiser),
+        (REFERENCES, scenario.reference.kind),
+        (VEHICLES, scenario.robot.vehicle.kind),
+        *((FIGURES, name) for name in scenario.own_figures),
+    )
+    return [(registry.kind, registry.get(name)) for registry, name in used]
+
+
+def make_manifest(spec: RunSpec, parameters: Mapping[str, float], used: Used) -> Manifest:
+    """Return the manifest a record opens with; raises BadInput.
+
+    `parameters` are the board's, `used` is what the registries gave (`used_things`).
+    """
+    law = OUTER_LAWS.get(spec.outer)
+    gains = spec.scenario.control.active_gains.of(law)
+    now_us = time.time_ns() // 1000
+    return Manifest(
+        command=spec.command,
+        scenario=spec.scenario.model_dump(mode="json"),
+        seed=spec.seed,
+        target=spec.target,
+        camera=spec.camera,
+        outer=law.name,
+        inner=spec.inner,
+        gains={
+            "outer": gains.model_dump(mode="json") if gains is not None else {},
+            "set": spec.scenario.control.gain_set,
+            "board": dict(parameters),
+        },
+        plugins=_from_outside(spec, used),
+        trace=trace_terms(law),
+        figures=[FigureTerm.of(metric_of(name)) for name in spec.scenario.own_figures],
+        open_loop_of=spec.target.removeprefix(REPLAY) if spec.target.startswith(REPLAY) else "",
+        notes=notes(spec.scenario),
+        versions=collect_versions(),
+        git_revision=git_revision(),
+        start_time_utc=datetime.fromtimestamp(now_us * 1e-6, UTC).isoformat(timespec="seconds"),
+        start_unix_us=now_us,
+    )
+
+
+def trace_terms(law: Entry) -> list[TraceTerm]:
+    """Return the columns that a law brings along, for a manifest; raises BadInput."""
+    return [
+        TraceTerm(name=column.name, unit=column.unit, meaning=column.meaning)
+        for column in own_columns(law)
+    ]
+
+
+def _from_outside(spec: RunSpec, used: Used) -> list[Plugin]:
+    """Return what takes part that is not of the harness, the robot's motion included."""
+    found = [Plugin.of(kind, entry) for kind, entry in used if entry.origin != BUILT_IN]
+    where = spec.scenario.robot.plant
+    if where != BUILT_IN_PLANT and spec.is_simulated:
+        path = Path(where)
+        text = None if where.startswith("tcp:") or not path.is_file() else path.read_text("utf-8")
+        source = None if text is None else SourceText(path, text)
+        found.append(Plugin.of("plant", Entry(where, type(None), "", origin=where, source=source)))
+    return found
