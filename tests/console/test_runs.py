@@ -104,6 +104,40 @@ def test_wrong_orders_are_one_line(console):
     assert set(console.records.iterdir()) == before
 
 
+def test_viewers_order_nothing_and_nothing_is_ordered_without_a_run(console):
+    """Tuning, steps, bring-up, cameras: the operator's alone; without a run, or wrongly said, one line each."""
+    with console.page("op") as operator, console.page("looks") as viewer:
+        orders = (
+            {"do": "tune", "key": "law.k1_s", "value": 2},
+            {"do": "step", "x_m": 0.1, "y_m": 0},
+            {"do": "undo"},
+            {"do": "bring-up", "order": {"target": "serial:/dev/null"}},
+            {"do": "answer", "value": "go"},
+            {"do": "look", "what": "open", "camera": {"source": "0"}},
+        )
+        for order in orders:
+            viewer.say(**order)
+            assert "only the operator" in viewer.until("said")[-1]["error"]
+        for order, said in zip(
+            orders,
+            ("while a run is on", "while a run is on", "while a run is on", "ALL wheels are off",
+             "nothing is asked", ""),
+            strict=True,
+        ):  # fmt: skip
+            if said:
+                operator.say(**order)
+                assert said in operator.until("said")[-1]["error"]
+        for camera, said in (
+            ({"source": "../x.avi"}, "x.avi"),
+            ({"source": "twin:/nowhere"}, "no such socket"),
+            ({"source": "0", "find": "board", "board": "chess:$(id)"}, "not understood"),
+            ({"source": "0", "find": "robot"}, "calibrate first"),
+            ({"source": "0", "controls": {"white_balance_k": -1}}, "white_balance_k"),
+        ):
+            operator.say(do="look", what="open", camera=camera)
+            assert said in operator.until("said")[-1]["error"]
+
+
 def test_anybody_stops(console):
     """STOP by a viewer in mid-run: the robot stands, the record is whole and says who did it."""
     with console.page("op") as operator, console.page("looks") as viewer:

@@ -17,23 +17,13 @@ from hil.rigs.frames import CaptureSource
 from sim_twin.camera_sim import RenderedCamera
 from sim_twin.samples import ROBOT_POSE
 from tests.calibration.test_sources import FakeCapture
-from tests.console.rig import CHROMIUM, NO_CHROMIUM, Console, served_twin
+from tests.console.rig import CHROMIUM, NO_CHROMIUM, Console, film, served_twin
 from vision.camera_setup import camera_model
 from vision.sources import CameraControls, LiveCamera
 
 realtime = pytest.mark.realtime
 chromium_needed = pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)
 CHESSBOARD = Path(__file__).parents[1] / "data" / "chessboard"
-
-
-def film(path, pictures, each=10):
-    """Write pictures as a video of 10 frames a second, each of them shown `each` times."""
-    height, width = pictures[0].shape[:2]
-    out = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10, (width, height))
-    for picture in pictures:
-        for _ in range(each):
-            out.write(picture)
-    out.release()
 
 
 def look_at(page, source, find):

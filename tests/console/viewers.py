@@ -1,4 +1,4 @@
-"""Deadline misses and latencies with and without viewers on the served twin: `python -m tests.console.viewers`.
+"""Misses and latencies on the served twin, with and without viewers: `python -m tests.console.viewers`.
 
 Runs take turns, so that whatever else the machine does falls on both alike.
 """
