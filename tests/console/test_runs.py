@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import threading
 import time
 
 import pytest
@@ -105,7 +106,7 @@ def test_wrong_orders_are_one_line(console):
 
 
 def test_viewers_order_nothing_and_nothing_is_ordered_without_a_run(console):
-    """Tuning, steps, bring-up, cameras: the operator's alone; without a run, or wrongly said, one line each."""
+    """Tuning, steps, bring-up, cameras: the operator's alone; wrongly said or out of place, one line each."""
     with console.page("op") as operator, console.page("looks") as viewer:
         orders = (
             {"do": "tune", "key": "law.k1_s", "value": 2},
@@ -155,16 +156,24 @@ def test_anybody_stops(console):
     assert hil.replay(record).identical
 
 
+def beat(page, ended):
+    """Say four times a second that the page is there, as a page does from the start on."""
+    while not ended.wait(0.25):
+        page.say(do="beat")
+
+
 def test_the_dead_man_stops_when_the_page_is_silent(console):
     """Beats keep the run going, their absence ends it; without the option silence is nothing."""
     long = ORDER | {"real_time": True, "overrides": ["duration_s=6"]}
     with console.page("op") as operator:
+        beats = threading.Event()
+        threading.Thread(target=beat, args=(operator, beats), daemon=True).start()
         operator.begin(**long | {"dead_man": True})
-        operator.until("state", phase="running")
+        operator.ticks()
         end_s = time.monotonic() + 2.0
         while time.monotonic() < end_s:
-            operator.say(do="beat")
-            time.sleep(0.2)
+            assert operator.ticks()  # it goes on as long as there are beats
+        beats.set()
         end = operator.until("state", phase="ended")[-1]["end"]
         assert end["outcome"] == "interrupted"
         events = (console.records / end["record"] / "events.jsonl").read_text()
