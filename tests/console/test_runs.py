@@ -164,7 +164,7 @@ def beat(page, ended):
 
 def test_the_dead_man_stops_when_the_page_is_silent(console):
     """Beats keep the run going, their absence ends it; without the option silence is nothing."""
-    long = ORDER | {"real_time": True, "overrides": ["duration_s=6"]}
+    long = ORDER | {"real_time": True, "overrides": ["duration_s=60"]}
     with console.page("op") as operator:
         beats = threading.Event()
         threading.Thread(target=beat, args=(operator, beats), daemon=True).start()
