@@ -11,12 +11,13 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 from urllib.parse import urlencode, urlsplit
 
+import cv2
 import pytest
 from websockets.sync.client import ClientConnection, connect
 
@@ -182,6 +183,16 @@ def served_twin(folder: Path, *options: str) -> Iterator[tuple[str, str]]:
     finally:
         server.send_signal(signal.SIGINT)
         server.wait(timeout=20)
+
+
+def film(path: Path, pictures: Sequence[Any], each: int = 10) -> None:
+    """Write pictures as a video of 10 frames a second, each of them shown `each` times."""
+    height, width = pictures[0].shape[:2]
+    out = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10, (width, height))
+    for picture in pictures:
+        for _ in range(each):
+            out.write(picture)
+    out.release()
 
 
 @contextlib.contextmanager

@@ -12,70 +12,16 @@ from pathlib import Path
 import pytest
 
 import hil
-from tests.console.rig import CHROMIUM, NO_CHROMIUM, PATIENCE_S, Console, browser, served_twin
+from tests.console.rig import CHROMIUM, NO_CHROMIUM, Console
 
 pytestmark = [pytest.mark.realtime, pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)]
 CHESSBOARD = Path(__file__).parents[1] / "data" / "chessboard"
 # A machine that is busy elsewhere is late by more than a rig may be.
 PATIENT = {"safety.pose_lost_s": 9, "safety.link_lost_s": 9}
-# What Chromium says of a server that is gone; anything else, the content security policy first, is a fault.
-ORDINARY = re.compile("WebSocket|Failed to load resource: net::ERR_CONNECTION")
-WAIT_MS = PATIENCE_S * 1e3
 
 
-@pytest.fixture(scope="module")
-def rig(tmp_path_factory):
-    """Serve a twin, and a console that begins with it."""
-    work = tmp_path_factory.mktemp("browser")
-    with (
-        served_twin(work, "--camera", "pose") as (target, camera),
-        Console(work, "--on", target, "--camera", camera) as console,
-    ):
-        yield console
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    """One browser for all."""
-    with browser() as started:
-        yield started
-
-
-@pytest.fixture
-def open_page(chromium):
-    """Return what opens a console in a page of its own, and fails for anything the browser objects to."""
-    from playwright.sync_api import expect  # noqa: PLC0415 - where there is a browser
-
-    expect.set_options(timeout=WAIT_MS)
-    objections: list[str] = []
-    contexts = []
-
-    def opened(console, **options):
-        context = chromium.new_context(**options)
-        contexts.append(context)
-        page = context.new_page()
-        page.set_default_timeout(WAIT_MS)
-        page.on("pageerror", lambda error: objections.append(str(error)))
-        page.on(
-            "console",
-            lambda said: (
-                objections.append(said.text)
-                if said.type == "error" and not ORDINARY.search(said.text)
-                else None
-            ),
-        )
-        page.goto(console.address)
-        expect(page.locator('#law option[value="asg-ism"]')).to_have_count(1)
-        return page
-
-    yield opened
-    for context in contexts:
-        context.close()
-    assert objections == []
-
-
-def start(page, scenario, duration_s):
-    """Choose a scenario, shorten it by the form of changed values, arm and start."""
+def start(page, scenario, duration_s, arm=True):
+    """Choose a scenario, shorten it by the form of changed values, connect, and arm once it was found."""
     page.select_option("#scenario", scenario)
     page.locator("#changes").evaluate("(details) => { details.open = true; }")
     for key, value in {"duration_s": duration_s, **PATIENT}.items():
@@ -83,7 +29,8 @@ def start(page, scenario, duration_s):
         page.fill("#setting-value", str(value))
         page.click("#setting-add")
     page.click("#start")
-    page.click("#arm")  # found first: it is enabled then
+    if arm:
+        page.click("#arm")  # enabled when the robot was found
 
 
 def ended(page, text):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import threading
 import time
 
 import pytest
@@ -104,6 +105,40 @@ def test_wrong_orders_are_one_line(console):
     assert set(console.records.iterdir()) == before
 
 
+def test_viewers_order_nothing_and_nothing_is_ordered_without_a_run(console):
+    """Tuning, steps, bring-up, cameras: the operator's alone; wrongly said or out of place, one line each."""
+    with console.page("op") as operator, console.page("looks") as viewer:
+        orders = (
+            {"do": "tune", "key": "law.k1_s", "value": 2},
+            {"do": "step", "x_m": 0.1, "y_m": 0},
+            {"do": "undo"},
+            {"do": "bring-up", "order": {"target": "serial:/dev/null"}},
+            {"do": "answer", "value": "go"},
+            {"do": "look", "what": "open", "camera": {"source": "0"}},
+        )
+        for order in orders:
+            viewer.say(**order)
+            assert "only the operator" in viewer.until("said")[-1]["error"]
+        for order, said in zip(
+            orders,
+            ("while a run is on", "while a run is on", "while a run is on", "ALL wheels are off",
+             "nothing is asked", ""),
+            strict=True,
+        ):  # fmt: skip
+            if said:
+                operator.say(**order)
+                assert said in operator.until("said")[-1]["error"]
+        for camera, said in (
+            ({"source": "../x.avi"}, "x.avi"),
+            ({"source": "twin:/nowhere"}, "no such socket"),
+            ({"source": "0", "find": "board", "board": "chess:$(id)"}, "not understood"),
+            ({"source": "0", "find": "robot"}, "calibrate first"),
+            ({"source": "0", "controls": {"white_balance_k": -1}}, "white_balance_k"),
+        ):
+            operator.say(do="look", what="open", camera=camera)
+            assert said in operator.until("said")[-1]["error"]
+
+
 def test_anybody_stops(console):
     """STOP by a viewer in mid-run: the robot stands, the record is whole and says who did it."""
     with console.page("op") as operator, console.page("looks") as viewer:
@@ -121,16 +156,24 @@ def test_anybody_stops(console):
     assert hil.replay(record).identical
 
 
+def beat(page, ended):
+    """Say four times a second that the page is there, as a page does from the start on."""
+    while not ended.wait(0.25):
+        page.say(do="beat")
+
+
 def test_the_dead_man_stops_when_the_page_is_silent(console):
     """Beats keep the run going, their absence ends it; without the option silence is nothing."""
-    long = ORDER | {"real_time": True, "overrides": ["duration_s=6"]}
+    long = ORDER | {"real_time": True, "overrides": ["duration_s=60"]}
     with console.page("op") as operator:
+        beats = threading.Event()
+        threading.Thread(target=beat, args=(operator, beats), daemon=True).start()
         operator.begin(**long | {"dead_man": True})
-        operator.until("state", phase="running")
+        operator.ticks()
         end_s = time.monotonic() + 2.0
         while time.monotonic() < end_s:
-            operator.say(do="beat")
-            time.sleep(0.2)
+            assert operator.ticks()  # it goes on as long as there are beats
+        beats.set()
         end = operator.until("state", phase="ended")[-1]["end"]
         assert end["outcome"] == "interrupted"
         events = (console.records / end["record"] / "events.jsonl").read_text()
