@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 @click.option("--kept", metavar="FILE",
               help="No run: what the data of an earlier verdict say; shipped: those of README.")  # fmt: skip
 @click.option("--task", metavar="FILE",
-              help="No search: kept fronts (--kept, else those that ship) on a task of your own.")  # fmt: skip
+              help="No search: kept fronts (--kept, else shipped) on a task of your own.")  # fmt: skip
 @json_option
 def command(
     deck: str,

@@ -299,3 +299,26 @@ def test_the_least_layer_is_what_it_is_set_to_where_mu_stands(eps_min):
         layers.append(loop.state.eps)
     assert layers[-1] == pytest.approx(eps_min, rel=1e-5)
     assert all(layer >= eps_min * (1 - 1e-5) for layer in layers)
+
+
+def test_the_turn_s_feed_forward_is_the_compensation_of_its_resistance():
+    """(2.33): FF_TURN on the faster side, minus it on the other, in proportion below FF_TURN_W."""
+    for faster, share in ((0.0, 0.0), (0.5, 0.25), (3.0, 1.0), (-0.5, -0.25), (-9.0, -1.0)):
+        duties = []
+        for turn in (0.0, 0.2):
+            loop = _firmware.WheelLoop(PID | {"FF_TURN": turn, "FF_TURN_W": 2.0})
+            loop.step_at_speed(2.0, 2.0, faster)  # no error: the duty is the feed-forward
+            duties.append(loop.state.duty)
+        assert duties[1] - duties[0] == pytest.approx(0.2 * share, abs=1e-6)
+
+
+def test_without_it_what_the_other_side_is_asked_for_changes_nothing():
+    """By default FF_TURN is 0: the same PWM to the count, whatever the other side's set-point."""
+    runs = []
+    for faster in (0.0, 4.0):
+        loop, motor, pwm = _firmware.WheelLoop(ISM), Motor(), []
+        for k in range(300):
+            pwm.append(loop.step(motor.counts, 3.0 if k < 150 else 1.0, faster))
+            motor.turn(pwm[-1])
+        runs.append(pwm)
+    assert runs[0] == runs[1]
