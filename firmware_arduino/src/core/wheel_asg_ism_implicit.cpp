@@ -20,7 +20,12 @@ Tuning tuning(const Params& p) {
   t.g = p.ism_g_duty_s2_rad;
   t.g_over_step = p.ism_g_duty_s2_rad / fmaxf(p.imp_step_s, TICK_S);
   t.bound_duty = p.imp_k_duty;
+  t.step_rad_s = p.ism_step_rad_s;
   return t;
+}
+
+bool stepped(const State& sl, const Tuning& t, float setpoint_rad_s) {
+  return fabsf(setpoint_rad_s - sl.step_base_rad_s) > t.step_rad_s;
 }
 
 float step(State& sl, const Tuning& t, const Tracked& w) {
@@ -28,6 +33,7 @@ float step(State& sl, const Tuning& t, const Tracked& w) {
   if (w.start != Start::RUNNING) {
     sl.integral = sl.average = 0.0f;
     sl.eta = -t.start_s * e;
+    sl.step_base_rad_s = w.demand.setpoint_rad_s;
   }
   sl.s = e + t.mu * (sl.integral + sl.eta + sl.average);
   const float kappa = t.mu * (e + with_sign(t.sigma, sl.integral));

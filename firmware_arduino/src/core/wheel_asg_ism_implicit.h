@@ -13,6 +13,7 @@ struct Tuning {
   float g;              // duty per unit of wheel acceleration
   float g_over_step;    // g over the step for which the sign is solved
   float bound_duty;     // k, what the sliding term may give
+  float step_rad_s;     // a set-point further off than this starts the law anew
 };
 
 struct State {
@@ -20,11 +21,12 @@ struct State {
   float average;   // sigma * integral of sgn E
   float eta;       // makes s(0) = 0
   float s;
+  float step_base_rad_s;  // set-point at which the law last started
 };
 
 Tuning tuning(const Params& params);
 inline void forget(State& law) { law.s = 0.0f; }
-inline bool stepped(const State&, const Tuning&, float) { return false; }
+bool stepped(const State& law, const Tuning& t, float setpoint_rad_s);
 // Float operations: 17.
 float step(State& law, const Tuning& t, const Tracked& w);
 inline float sliding(const State& law) { return law.s; }
