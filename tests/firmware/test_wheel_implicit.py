@@ -137,3 +137,15 @@ def test_without_its_bound_and_gain_nothing_holds_the_wheel():
         errors.append(tail_error(drive(loop, motor, 4.0, 3.0), 4.0, 2.0))
     assert errors[0] < 0.2
     assert errors[1] > 1.0
+
+
+def test_a_step_starts_the_law_on_its_surface():
+    """A set-point beyond ISM_STEP: the term is 0 in that tick; within it, it is bounded by k."""
+    for setpoint, within in ((9.0, 0.0), (3.0, K)):
+        loop = _firmware.WheelLoop(IMPLICIT | {"ISM_STEP": 5.0, "BUMP_TAU": 10.0})
+        for _ in range(20):
+            loop.step_at_speed(2.0, 2.0)
+        loop.step_at_speed(2.0, setpoint)
+        kappa = MU * (2.0 - setpoint)
+        law = loop.state.feedback_duty - loop.state.bump_duty * (10.0 + TICK_S) / 10.0
+        assert abs(-law - G * kappa) == pytest.approx(within, abs=2e-3)

@@ -9,11 +9,11 @@ namespace wheel_asg_ism_implicit {
 
 struct Tuning {
   float mu, sigma, sigma_tick, average_max;
-  float start_s;        // 1/mu: makes s(0) = 0
-  float g;              // duty per unit of wheel acceleration
-  float g_over_step;    // g over the step for which the sign is solved
-  float bound_duty;     // k, what the sliding term may give
-  float step_rad_s;     // a set-point further off than this starts the law anew
+  float start_s;      // 1/mu: makes s(0) = 0
+  float g;            // duty per unit of wheel acceleration
+  float g_over_step;  // g over the step for which the sign is solved
+  float bound_duty;   // k, what the sliding term may give
+  float step_rad_s;   // a set-point further off than this starts the law anew
 };
 
 struct State {
