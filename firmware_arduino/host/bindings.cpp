@@ -146,23 +146,23 @@ class WheelLoop {
   }
 
   // A tick on the encoder.
-  int16_t step(int32_t counts, float setpoint_rad_s) {
+  int16_t step(int32_t counts, float setpoint_rad_s, float faster_rad_s) {
     estimate(counts);
-    return control(setpoint_rad_s);
+    return control(setpoint_rad_s, faster_rad_s);
   }
 
   // A tick with the speed given instead of measured.
-  int16_t step_at_speed(float omega_rad_s, float setpoint_rad_s) {
+  int16_t step_at_speed(float omega_rad_s, float setpoint_rad_s, float faster_rad_s) {
     wheel_.omega_rad_s = omega_rad_s;
-    return control(setpoint_rad_s);
+    return control(setpoint_rad_s, faster_rad_s);
   }
 
   void off() { hil::wheel_off(wheel_); }
   hil::Wheel& state() { return wheel_; }
 
  private:
-  int16_t control(float setpoint_rad_s) {
-    hil::wheel_control(wheel_, tuning_, setpoint_rad_s);
+  int16_t control(float setpoint_rad_s, float faster_rad_s) {
+    hil::wheel_control(wheel_, tuning_, setpoint_rad_s, hil::wheel_turn_duty(tuning_, faster_rad_s));
     hil::wheel_limit(wheel_, tuning_);
     return wheel_.pwm;
   }
@@ -279,8 +279,9 @@ void bind_wheel(nb::module_& m) {
       .def(nb::init<const Values&>(), "parameters"_a = Values{})
       .def("retune", &WheelLoop::retune, "parameters"_a)
       .def("estimate", &WheelLoop::estimate, "counts"_a)
-      .def("step", &WheelLoop::step, "counts"_a, "setpoint_rad_s"_a)
-      .def("step_at_speed", &WheelLoop::step_at_speed, "omega_rad_s"_a, "setpoint_rad_s"_a)
+      .def("step", &WheelLoop::step, "counts"_a, "setpoint_rad_s"_a, "faster_rad_s"_a = 0.0f)
+      .def("step_at_speed", &WheelLoop::step_at_speed, "omega_rad_s"_a, "setpoint_rad_s"_a,
+           "faster_rad_s"_a = 0.0f)
       .def("off", &WheelLoop::off)
       .def_prop_ro("state", &WheelLoop::state, nb::rv_policy::reference_internal);
 }

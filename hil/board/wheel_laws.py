@@ -8,6 +8,8 @@ from hil.core.errors import BadInput
 _table = wheel_laws()
 # Value of the board's parameter LAW by the law's name; the first is what a board starts with.
 WHEEL_LAWS: dict[str, float] = {law.name: law.value for law in _table}
+# The two that ship for the matrix of outer and wheel law, the benchmark first.
+MATRIX: tuple[str, str] = ("pid", "asg-ism")
 SUMMARIES: dict[str, str] = {law.name: law.doc for law in _table}
 
 

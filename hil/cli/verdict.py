@@ -42,12 +42,15 @@ if TYPE_CHECKING:
               help="Where the data go. [default: verdict.json in a new folder of runs/]")  # fmt: skip
 @click.option("--kept", metavar="FILE",
               help="No run: what the data of an earlier verdict say; shipped: those of README.")  # fmt: skip
+@click.option("--task", metavar="FILE",
+              help="No search: kept fronts (--kept, else shipped) on a task of your own.")  # fmt: skip
 @json_option
 def command(
     deck: str,
     outers: tuple[str, ...],
     short: bool,
     kept: str | None,
+    task: str | None,
     out: Path | None,
     workers: int | None,
     ablated: bool,
@@ -62,6 +65,9 @@ def command(
     that one of them does not show is no difference shown.
 
     The data are written after each seed of the search, so that an early end leaves those.
+
+    With --task the points of the fronts are run on a scenario of your own, and it is said whether it ranks
+    the laws as the verdict does.
     """
     from hil.core.errors import BadInput
     from hil.core.files import replace_file
@@ -73,6 +79,9 @@ def command(
     from hil.study.suite import OnSuite
     from hil.study.verdict import SHORT, Field, VerdictPlan, verdict_data
 
+    if task is not None:
+        _own_task(task, deck, outers, _read(kept or "shipped"), workers, as_json)
+        return
     if kept is not None:
         _say_all(_read(kept), as_json, None)
         return
@@ -99,6 +108,38 @@ def command(
             replace_file(file, json.dumps(data, indent=1, ensure_ascii=False).encode() + b"\n")
     verdict_page.write(file.with_suffix(".html"), data)
     _say_all(data, as_json, file)
+
+
+def _own_task(
+    file: str,
+    deck: str,
+    laws: Sequence[str],
+    data: dict[str, Any],
+    workers: int | None,
+    as_json: bool,
+) -> None:
+    """Run the kept fronts on a task of one's own and say how it ranks the laws."""
+    from hil.config.deck import load_deck
+    from hil.study import own_task
+    from hil.study import verdict_words as words
+    from hil.study.campaign.workers import Pool
+    from hil.study.suite import OnSuite
+
+    data = own_task.only_laws(data, laws)
+    task = own_task.OwnTask.of(file, load_deck(deck), data)
+    with Pool(OnSuite(task.scenarios), workers or os.cpu_count() or 1) as pool:
+        told = own_task.judged_on(task, data, _make(pool))
+    found = own_task.Agreement.of(told, data)
+    if as_json:
+        print_json(found.to_json() | {"data": told})
+        return
+    console = plain_console()
+    console.print(
+        f"at a calm of {words.MAIN_LEVEL:g}, in {len(task.cells)} conditions no search has seen:"
+    )
+    for law, score in found.own.items():
+        console.print(f"  {law}: accuracy {score:.2f} (verdict {found.verdict[law]:.2f})")
+    console.print(found.text())
 
 
 def _make(pool: Any) -> Make:

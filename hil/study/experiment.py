@@ -11,7 +11,7 @@ from pathlib import Path
 from random import Random
 from typing import TYPE_CHECKING, Any
 
-from hil.board.wheel_laws import WHEEL_LAWS
+from hil.board.wheel_laws import MATRIX
 from hil.config.fit import check_fit
 from hil.config.gains import only_gains_of
 from hil.core.errors import BadInput
@@ -60,7 +60,7 @@ class Conditions:
     @property
     def inners(self) -> tuple[str, ...]:
         """Return the wheel laws."""
-        return tuple(sorted(WHEEL_LAWS, reverse=True)) if self.inner == "both" else (self.inner,)
+        return MATRIX if self.inner == "both" else (self.inner,)
 
 
 def deck_specs(deck: Deck, conditions: Conditions, folder: Path) -> list[RunSpec]:

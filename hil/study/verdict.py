@@ -77,6 +77,17 @@ def shipped_text() -> str:
     return (files("hil") / "data" / "verdict.json").read_text(encoding="utf-8")
 
 
+def repeated_texts() -> dict[str, str]:
+    """Return the data of verdicts made again with other seeds of the search, by their file's name."""
+    folder = files("hil") / "data" / "verdicts"
+    found = (
+        [one for one in folder.iterdir() if one.name.endswith(".json")] if folder.is_dir() else []
+    )
+    return {
+        one.name: one.read_text(encoding="utf-8") for one in sorted(found, key=lambda one: one.name)
+    }
+
+
 SHORT = VerdictPlan(
     candidates=8,
     search_cells=2,

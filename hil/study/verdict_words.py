@@ -195,6 +195,19 @@ def first_line(data: Data) -> str:
     )
 
 
+def repeated_line(data: Data, again: Data) -> str:
+    """Return whether a verdict made again with other seeds of the search says the same, with its budget."""
+    plan = again["plan"]
+    seeds = ", ".join(map(str, plan["search_seeds"]))
+    budget = (
+        f"seeds of the search {seeds}, {plan['candidates']} candidates a law in "
+        f"{len(again['search_cells'])} cells, judged in {len(again['unseen_cells'])} unseen cells"
+    )
+    if first_line(again) == first_line(data):
+        return f"Made again ({budget}) it says the same."
+    return f"Made again ({budget}) it says otherwise: {first_line(again)}"
+
+
 def volumes(data: Data) -> dict[str, tuple[float, Interval]]:
     """Return each law's hypervolume in the search: mean and interval over the seeds."""
     result = {}

@@ -103,6 +103,10 @@ def _pushed(target: Any, amplitude: float, **where: Any) -> Disturbance:
     return Disturbance(target=target, shape="step", amplitude=amplitude, start_s=1.5, **where)
 
 
+def _swaying(target: Any, amplitude: float, frequency_hz: float) -> Disturbance:
+    return Disturbance(target=target, shape="sine", amplitude=amplitude, frequency_hz=frequency_hz)
+
+
 # Speeds: 10.4 rad/s is the limit of 0.5 m/s, 5.6 rad/s that of 2.5 rad/s of turn on the spot.
 CASES: dict[str, Case] = {
     "step": Case(_both(lambda t: 6.0 if t >= 0.2 else 0.0), 2.2, 0.2),
@@ -132,6 +136,16 @@ CASES: dict[str, Case] = {
     ),
     "battery sag": Case(
         _both(lambda t: min(8.0 * t, 6.0)), 3.0, 1.5, (_pushed("battery_sag_v", 1.5),)
+    ),
+    "swaying load": Case(
+        _both(lambda t: min(8.0 * t, 3.0)),
+        4.0,
+        None,
+        (_swaying("load_left_n_m", 0.12, 1.0), _swaying("load_right_n_m", 0.08, 0.6)),
+    ),
+    "brake in bends": Case(_weave, 4.0, None, (_pushed("brake_right_n_m", 0.12),)),
+    "twisted crawl": Case(
+        _both(lambda t: min(2.0 * t, 0.5)), 4.0, None, (_swaying("torque_yaw_n_m", 0.4, 0.5),)
     ),
 }
 

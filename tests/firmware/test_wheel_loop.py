@@ -10,7 +10,8 @@ import pytest
 from hil.board import _firmware
 from tests.firmware.bench import TICK_S, Motor, rms
 
-ISM, PID = {"LAW": 0.0}, {"LAW": 1.0}
+ISM, PID, IMPLICIT = {"LAW": 0.0}, {"LAW": 1.0}, {"LAW": 2.0}
+LAWS = [ISM, PID, IMPLICIT]
 TOP = _firmware.PWM_TOP
 
 
@@ -30,16 +31,16 @@ def tail_error(trace, wanted, from_s):
     return rms(speed - wanted for t, _, speed, _, _ in trace if t >= from_s)
 
 
-@pytest.mark.parametrize("law", [ISM, PID])
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("wanted", [-11.0, -2.0, 0.5, 2.0, 8.0, 11.0])
-def test_both_laws_reach_the_set_point(law, wanted):
+def test_every_law_reaches_the_set_point(law, wanted):
     """From 24 mm/s to 0.53 m/s at the rim, either way, on a motor 10 % off the feed-forward."""
     trace = drive(_firmware.WheelLoop(law), Motor(gain=15.3), wanted, 3.0)
     assert tail_error(trace, wanted, 2.0) < 0.06 * abs(wanted) + 0.05
 
 
-@pytest.mark.parametrize("law", [ISM, PID])
-def test_both_laws_crawl(law):
+@pytest.mark.parametrize("law", LAWS)
+def test_every_law_crawls(law):
     """0.1 rad/s (5 mm/s at the rim, 30 counts a second) within a tenth of that on average."""
     trace = drive(_firmware.WheelLoop(law), Motor(), 0.1, 6.0)
     travelled = sum(speed for t, _, speed, _, _ in trace if t >= 2.0) * TICK_S
@@ -176,7 +177,8 @@ def test_a_step_keeps_what_the_feedback_had_learnt():
 @pytest.mark.parametrize(
     ("before", "after"),
     [(ISM, PID), (PID, ISM), (ISM, ISM | {"FF_GAIN": 0.03, "ISM_K0": 0.3}), (PID, PID | {"PID_KP": 1.0}),
-     (ISM, ISM | {"ISM_FORM": 1.0})],
+     (ISM, ISM | {"ISM_FORM": 1.0}), (PID, IMPLICIT), (IMPLICIT, ISM),
+     (IMPLICIT, IMPLICIT | {"IMP_MU": 20.0})],
 )  # fmt: skip
 def test_a_change_of_law_or_gains_is_bumpless(before, after):
     """The wanted duty at the tick of the change is that of the tick before, under load, in motion."""
@@ -202,19 +204,19 @@ def test_without_the_transfer_offset_there_would_be_a_bump():
 
 
 @pytest.mark.parametrize("limit", [0.3, 1.0])
-def test_both_laws_obey_the_same_limits(limit):
+def test_all_laws_obey_the_same_limits(limit):
     """A step of 20 rad/s forward and back: PWM within PWM_MAX, its change within PWM_SLEW."""
     extremes = []
-    for law in (ISM, PID):
+    for law in LAWS:
         loop = _firmware.WheelLoop(law | {"PWM_MAX": limit, "PWM_SLEW": 10.0})
         trace = drive(loop, Motor(), lambda t: 20.0 if t < 1.0 else -20.0, 2.0)
         pwm = [0, *(p for _, p, _, _, _ in trace)]
         assert max(abs(b - a) for a, b in itertools.pairwise(pwm)) == 16  # 10 / 250 * 400
         extremes.append((min(pwm), max(pwm)))
-    assert extremes == [(-round(limit * TOP), round(limit * TOP))] * 2
+    assert extremes == [(-round(limit * TOP), round(limit * TOP))] * len(LAWS)
 
 
-@pytest.mark.parametrize("law", [ISM, PID])
+@pytest.mark.parametrize("law", LAWS)
 def test_integrals_stop_while_the_output_is_saturated(law):
     """Asked for twice the top speed for 5 s, the integrals stay where saturation met them."""
     loop, motor = _firmware.WheelLoop(law), Motor()
@@ -228,7 +230,7 @@ def test_integrals_stop_while_the_output_is_saturated(law):
     assert 4.5 * abs(motor.omega_rad_s - 20.0) > 10.0 * max(abs(value) for value in held)
 
 
-@pytest.mark.parametrize("law", [ISM, PID])
+@pytest.mark.parametrize("law", LAWS)
 def test_no_overshoot_after_saturation(law):
     """Back from an unreachable 20 to 5 rad/s the wheel settles within a second."""
     loop, motor = _firmware.WheelLoop(law), Motor()
@@ -297,3 +299,26 @@ def test_the_least_layer_is_what_it_is_set_to_where_mu_stands(eps_min):
         layers.append(loop.state.eps)
     assert layers[-1] == pytest.approx(eps_min, rel=1e-5)
     assert all(layer >= eps_min * (1 - 1e-5) for layer in layers)
+
+
+def test_the_turn_s_feed_forward_is_the_compensation_of_its_resistance():
+    """(2.33): FF_TURN on the faster side, minus it on the other, in proportion below FF_TURN_W."""
+    for faster, share in ((0.0, 0.0), (0.5, 0.25), (3.0, 1.0), (-0.5, -0.25), (-9.0, -1.0)):
+        duties = []
+        for turn in (0.0, 0.2):
+            loop = _firmware.WheelLoop(PID | {"FF_TURN": turn, "FF_TURN_W": 2.0})
+            loop.step_at_speed(2.0, 2.0, faster)  # no error: the duty is the feed-forward
+            duties.append(loop.state.duty)
+        assert duties[1] - duties[0] == pytest.approx(0.2 * share, abs=1e-6)
+
+
+def test_without_it_what_the_other_side_is_asked_for_changes_nothing():
+    """By default FF_TURN is 0: the same PWM to the count, whatever the other side's set-point."""
+    runs = []
+    for faster in (0.0, 4.0):
+        loop, motor, pwm = _firmware.WheelLoop(ISM), Motor(), []
+        for k in range(300):
+            pwm.append(loop.step(motor.counts, 3.0 if k < 150 else 1.0, faster))
+            motor.turn(pwm[-1])
+        runs.append(pwm)
+    assert runs[0] == runs[1]

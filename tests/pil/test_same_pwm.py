@@ -18,8 +18,8 @@ from tests.pil.rigs import Tap, needs_toolchain
 pytestmark = needs_toolchain
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
+@pytest.fixture(scope="module", params=["asg-ism", "asg-ism-implicit"])
+def recorded(tmp_path_factory, request):
     """Run a scenario on the ELF: (snapshots of the board, frames of the host).
 
     A snapshot is of early in a tick, when its inputs are taken and the link rests: it has the PWM
@@ -38,7 +38,7 @@ def recorded(tmp_path_factory):
             target="pil",
             camera="pose",
             outer="asg-ism",
-            inner="asg-ism",
+            inner=request.param,
             seed=1,
             out=tmp_path_factory.mktemp("pil") / "run",
             rerun=False,

@@ -18,7 +18,7 @@ from tests.system.test_turn_first import Same
 
 TICK_S = 1.0 / 30.0
 NEVER = "control.limits.let_go_rad_s=0.0001"
-# What `hil falsify ahead --outer asg-ism` had found: the robot of a run that ended in a stall, 8 mm off its point.
+# What `hil falsify ahead --outer asg-ism` had found: a run that ended in a stall, 8 mm off its point.
 FOUND = (
     "start.theta_rad=0.33", "mismatch.mass_kg=1.18", "mismatch.inertia_kg_m2=1.3",
     "mismatch.wheel_radius_m=1.19", "camera.latency_s=0.075",

@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 
 from hil.study import verdict_words as words
-from hil.study.verdict import shipped_text
+from hil.study.verdict import repeated_texts, shipped_text
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -39,6 +39,7 @@ def block(data):
         budget(data),
         "\n".join(words.readme_table(data)),
         ranked,
+        *(words.repeated_line(data, json.loads(text)) for text in repeated_texts().values()),
     ]
     return "\n\n".join(parts)
 

@@ -67,7 +67,7 @@ class Sees:
     def reset(self, reference, here):
         """Nothing is kept."""
 
-    def step(self, reference, here, dt_s):
+    def step(self, reference, here, _dt_s):
         """Return a command whose trace has vectors and a scalar."""
         self.seen = (reference, here)
         trace = {"s_x": 1.0, "s_y": 0.0, "z2_x_m_s": 0.0, "z2_y_m_s": 2.0, "eps": 3.0, "max_x": 4.0}
@@ -121,7 +121,7 @@ def test_a_search_runs_its_cases_in_the_axes_drawn_for_them(monkeypatch):
     """By case and seed: what the search hands to the run has that angle."""
     seen = []
 
-    def kept(scenario, name):
+    def kept(_scenario, name):
         seen.append(name)
         raise InterruptedError
 

@@ -12,7 +12,7 @@ from hil.core.errors import BadInput
 from hil.study import verdict_page
 from hil.study import verdict_words as words
 from hil.study.suite import KEPT
-from hil.study.verdict import SHORT, Field, VerdictPlan, shipped_text, verdict_data
+from hil.study.verdict import SHORT, Field, VerdictPlan, repeated_texts, shipped_text, verdict_data
 from tests.verdict.pages import pages
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -162,6 +162,26 @@ def test_kept_data_that_are_none_are_refused(tmp_path):
         CliRunner().invoke(
             command, ["--kept", str(file)], standalone_mode=False, catch_exceptions=False
         )
+
+
+def test_a_verdict_made_again_says_the_same_or_the_page_says_that_it_does_not(told):
+    """Same first line: said so with its budget; another one: quoted."""
+    same = words.repeated_line(told["level"], told["level"])
+    assert same.startswith("Made again (seeds of the search 1, 2, ")
+    assert same.endswith("it says the same.")
+    other = words.repeated_line(told["level"], told["wins"])
+    assert other.endswith(f"it says otherwise: {words.first_line(told['wins'])}")
+
+
+@pytest.mark.parametrize("name", repeated_texts())
+def test_the_verdict_made_again_has_other_seeds_and_is_compared_on_the_readme(name):
+    """No seed of the search is in both, the laws are the same, and README tells what comes of it."""
+    data, again = json.loads(shipped_text()), json.loads(repeated_texts()[name])
+    assert not set(data["plan"]["search_seeds"]) & set(again["plan"]["search_seeds"])
+    assert data["laws"] == again["laws"]
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"**{words.first_line(data)}**" in readme
+    assert words.repeated_line(data, again) in readme
 
 
 def test_readme_and_docs_say_what_the_data_say():

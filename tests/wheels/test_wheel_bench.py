@@ -23,6 +23,7 @@ HELD_OUT = wheel_bench.held_out(1)
 START = {name: middle for box in wheel_tune.SEARCH.values() for name, (_, middle, _) in box.items()}
 OFF = {
     "asg-ism": {"ISM_K0": 0.0, "ISM_G": 0.0},
+    "asg-ism-implicit": {"IMP_K": 0.0, "ISM_G": 0.0},
     "pid": {"PID_KP": 0.0, "PID_KI": 0.0, "PID_KD": 0.0},
 }
 

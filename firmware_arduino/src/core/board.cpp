@@ -60,9 +60,10 @@ void check(Board& b, const SafetyView& view) {
 
 void control(Board& b) {
   if (!drives(b)) return;
-  for (uint8_t i = 0; i < SIDES; ++i) {
-    wheel_control(b.wheel[i], b.tuning, b.setpoint.omega_rad_s[i]);
-  }
+  const float* const asked = b.setpoint.omega_rad_s;
+  const float turn = wheel_turn_duty(b.tuning, asked[RIGHT] - asked[LEFT]);
+  wheel_control(b.wheel[LEFT], b.tuning, asked[LEFT], -turn);
+  wheel_control(b.wheel[RIGHT], b.tuning, asked[RIGHT], turn);
 }
 
 void limit(Board& b) {

@@ -23,6 +23,7 @@ enum class Start : uint8_t { RUNNING, ANEW, RETUNED, STEPPED };
 struct Demand {
   float setpoint_rad_s;
   float forward_duty;  // feed-forward
+  float turn_duty;     // what of it is for the turn
   bool zero;           // counts as zero
 };
 

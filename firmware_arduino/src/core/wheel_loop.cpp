@@ -16,9 +16,9 @@ constexpr float TWO_PI_RAD = 6.2831853f;
 // Share a first-order low-pass takes of a new value per tick (backward Euler).
 float blend(float tau_s) { return TICK_S / (tau_s + TICK_S); }
 
-Demand demand_of(const WheelTuning& t, float setpoint_rad_s) {
+Demand demand_of(const WheelTuning& t, float setpoint_rad_s, float turn_duty) {
   const float coulomb = clamp(setpoint_rad_s * t.ff_inv_dead_s_rad, 1.0f);
-  return {setpoint_rad_s, t.ff_duty_s_rad * setpoint_rad_s + t.ff_dead_duty * coulomb,
+  return {setpoint_rad_s, t.ff_duty_s_rad * setpoint_rad_s + t.ff_dead_duty * coulomb + turn_duty, turn_duty,
           fabsf(setpoint_rad_s) <= t.hold_setpoint_rad_s};
 }
 
@@ -59,8 +59,8 @@ void laws_forget(Wheel& w) {
 }
 
 // A new set-point; so far from where the law last started that it starts anew, it is a step.
-void take_setpoint(Wheel& w, const WheelTuning& t, float setpoint_rad_s) {
-  w.demand = demand_of(t, setpoint_rad_s);
+void take_setpoint(Wheel& w, const WheelTuning& t, float setpoint_rad_s, float turn_duty) {
+  w.demand = demand_of(t, setpoint_rad_s, turn_duty);
   w.fresh = true;
   if (w.start == Start::RUNNING && law_stepped(w, t, setpoint_rad_s)) w.start = Start::STEPPED;
 }
@@ -88,6 +88,8 @@ WheelTuning wheel_tuning(const Params& p) {
   t.ff_duty_s_rad = p.ff_duty_s_rad;
   t.ff_dead_duty = p.ff_dead_duty;
   t.ff_inv_dead_s_rad = 1.0f / p.ff_dead_rad_s;
+  t.ff_turn_duty = p.ff_turn_duty;
+  t.ff_inv_turn_s_rad = 1.0f / p.ff_turn_rad_s;
   t.hold_setpoint_rad_s = p.hold_setpoint_rad_s;
   t.hold_omega_rad_s = p.hold_omega_rad_s;
   t.law = static_cast<Law>(static_cast<uint8_t>(p.law));
@@ -117,10 +119,16 @@ void wheel_estimate(Wheel& w, const WheelTuning& t, int32_t counts) {
   w.omega_rad_s += t.omega_blend * (raw - w.omega_rad_s);
 }
 
-void wheel_control(Wheel& w, const WheelTuning& t, float setpoint_rad_s) {
+float wheel_turn_duty(const WheelTuning& t, float faster_rad_s) {
+  if (is_zero(t.ff_turn_duty)) return 0.0f;
+  return t.ff_turn_duty * clamp(faster_rad_s * t.ff_inv_turn_s_rad, 1.0f);
+}
+
+void wheel_control(Wheel& w, const WheelTuning& t, float setpoint_rad_s, float turn_duty) {
   w.fresh = false;
-  if (setpoint_rad_s != w.demand.setpoint_rad_s || w.start != Start::RUNNING) {
-    take_setpoint(w, t, setpoint_rad_s);
+  if (setpoint_rad_s != w.demand.setpoint_rad_s || turn_duty != w.demand.turn_duty ||
+      w.start != Start::RUNNING) {
+    take_setpoint(w, t, setpoint_rad_s, turn_duty);
   }
   w.holding = w.demand.zero && fabsf(w.omega_rad_s) <= t.hold_omega_rad_s;
   if (w.holding) {

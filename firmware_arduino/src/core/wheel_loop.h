@@ -18,6 +18,7 @@ struct WheelTuning {
   float error_rate_blend;
   float inv_error_rate_tau_1_s;
   float ff_duty_s_rad, ff_dead_duty, ff_inv_dead_s_rad;
+  float ff_turn_duty, ff_inv_turn_s_rad;
   float hold_setpoint_rad_s, hold_omega_rad_s;
   Law law;
 #define WHEEL_LAW(ID, files, name, doc) wheel_##files::Tuning files;
@@ -46,9 +47,12 @@ void wheel_init(Wheel& w, const WheelTuning& t, int32_t counts);
 // Speed from the counts of this tick. Float operations, division and root as four: 20; 2,500 cycles on
 // the ATmega2560.
 void wheel_estimate(Wheel& w, const WheelTuning& t, int32_t counts);
-// Wanted duty for the set-point. Float operations: ASG-ISM 38 (while eps(t) still falls 46), PID 18; on
+// What a side's feed-forward has of the turn (2.33): `faster_rad_s` is how much its set-point is above the
+// other side's.
+float wheel_turn_duty(const WheelTuning& t, float faster_rad_s);
+// Wanted duty for the set-point; `turn_duty` is of the tick in which the set-points came. Float operations: ASG-ISM 38 (while eps(t) still falls 46), PID 18; on
 // a new set-point 8 more. ASG-ISM takes 6,500 cycles.
-void wheel_control(Wheel& w, const WheelTuning& t, float setpoint_rad_s);
+void wheel_control(Wheel& w, const WheelTuning& t, float setpoint_rad_s, float turn_duty);
 // Rounds to PWM counts, limits range and slew, notes saturation. Float operations: 4; 700 cycles.
 void wheel_limit(Wheel& w, const WheelTuning& t);
 // Sliding variable of the law in force, for the telemetry; 0 where it has none.
