@@ -150,12 +150,14 @@ def cells(
     ]
 
 
-def run_cell(fault: str, instant: str, law: str, seed: int = 1) -> Cell:
-    """Run one cell and judge it; at speed the record is written, read and replayed too."""
+def run_cell(
+    fault: str, instant: str, law: str, seed: int = 1, scratch: Path | None = None
+) -> Cell:
+    """Run one cell and judge it; at speed the record is written (to `scratch`), read and replayed too."""
     row = next(row for row in ROWS if row.name == fault)
     start_s = INSTANTS[instant] + (DURATION_S + 0.02 if instant == CLOSING else 0.0)
     scenario = load_scenario(SCENARIO, [f"duration_s={DURATION_S:g}", *row.overrides(start_s)])
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(dir=scratch) as folder:
         spec = RunSpec(
             scenario, "twin", row.camera, law, "asg-ism", seed, Path(folder) / "run", rerun=False
         )
