@@ -87,6 +87,14 @@ def read_text(path: Path, limit_bytes: int = TEXT_BYTES, encoding: str = "utf-8"
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
+def is_file(path: Path) -> bool:
+    """Say whether there is such a file; there is none of a name that is too long for any."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
+
+
 def check_size(path: Path, limit_bytes: int = LOG_BYTES) -> None:
     """Raise BadInput for a file that is too large to be read as a whole; OSError when it is not there."""
     size = path.stat().st_size
