@@ -63,7 +63,9 @@ def end(command: Command, kind: str, rng: random.Random, folder: Path) -> End:
     prepare(folder)
     drawn = rng.uniform(0.0, 1.2 * command.whole_s)
     if kind in {"file limit", "disk full"}:
-        drawn = float(int(10.0 ** rng.uniform(*((3.3, 6.0) if kind == "file limit" else (4.8, 6.3)))))
+        drawn = float(
+            int(10.0 ** rng.uniform(*((3.3, 6.0) if kind == "file limit" else (4.8, 6.3))))
+        )
     with _disk(kind, folder, int(drawn)) as give_room:
         process, said = _ended(command, kind, drawn, rng, folder)
         flaws = _flaws(command, kind, process, said, folder)
@@ -104,7 +106,13 @@ def _in_a_terminal(
     master, slave = os.openpty()
     helper = [sys.executable, "-c", _TAKE_TERMINAL, *command.line(folder)]
     process = subprocess.Popen(
-        helper, text=True, cwd=folder, start_new_session=True, stdin=slave, stdout=slave, stderr=slave
+        helper,
+        text=True,
+        cwd=folder,
+        start_new_session=True,
+        stdin=slave,
+        stdout=slave,
+        stderr=slave,
     )
     os.close(slave)
     wait_for_python(process)
@@ -168,7 +176,9 @@ def _strike(
     """Do it: a signal goes to the process, or to all that the terminal has, as Ctrl-C does."""
     if kind == "folder gone":
         out = command.out(folder)
-        while process.poll() is None and not (out.exists() and (out.is_file() or any(out.iterdir()))):
+        while process.poll() is None and not (
+            out.exists() and (out.is_file() or any(out.iterdir()))
+        ):
             time.sleep(0.005)
         time.sleep(rng.uniform(0.0, command.whole_s))  # while it is closed too
         shutil.rmtree(folder / DISK, ignore_errors=True)
@@ -274,7 +284,9 @@ def _goes_on(command: Command, folder: Path) -> list[str]:
     again = subprocess.run(
         command.line(folder), capture_output=True, text=True, cwd=folder, check=False
     )
-    flaws = [] if again.returncode in {0, 1} else [f"again: {again.returncode}: {again.stderr[-500:]}"]
+    flaws = (
+        [] if again.returncode in {0, 1} else [f"again: {again.returncode}: {again.stderr[-500:]}"]
+    )
     if lost := kept - command.kept(out):
         flaws.append(f"again: {len(lost)} of {len(kept)} results were not kept")
     bad = [record.name for record in records(folder) if outcome(record) != "complete"]
