@@ -14,6 +14,7 @@ from hil.config.control import OuterLawName
 from hil.config.events import Disturbance
 from hil.config.load import build, load_scenario, put_value, read_tree
 from hil.config.scenario import Scenario
+from hil.core.files import is_file
 
 CALM = "calm"
 

@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hil.core.errors import BadInput
 from hil.core.figures import METRICS
-from hil.core.files import replace_file
+from hil.core.files import replace_file, unwritable
 from hil.core.text import visible
 
 if TYPE_CHECKING:
@@ -44,4 +43,4 @@ def write_csv(path: Path, runs: Sequence[RunRecord]) -> None:
     try:
         replace_file(path, out.getvalue().encode())
     except OSError as error:
-        raise BadInput(f"--csv {path}: cannot be written: {error.strerror}") from None
+        raise unwritable(f"--csv {path}", error) from None

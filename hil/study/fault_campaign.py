@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from hil.core.errors import BadInput
-from hil.core.files import replace_file
+from hil.core.files import replace_file, unwritable
 from hil.core.registry import in_one_line
 from hil.study.campaign.workers import in_processes
 from hil.study.fault_free import MOST_RATIO, fault_free, most_ratio
@@ -130,7 +130,7 @@ def _appending(path: Path, keys: Sequence[str]) -> Iterator[IO[str]]:
                 replace_file(path, text)
         file = path.open("a", encoding="utf-8")
     except OSError as error:
-        raise BadInput(f"{path}: cannot be written: {error.strerror}") from None
+        raise unwritable(str(path), error) from None
     with file:
         yield file
 

@@ -1,4 +1,4 @@
-"""A host against anything between it and its robot: nothing moves unarmed or beyond limits, all ends at rest."""
+"""A host and anything between it and its robot: nothing moves unarmed or beyond limits; all ends at rest."""
 
 from __future__ import annotations
 
