@@ -136,14 +136,15 @@ def compute(
         raise BadInput(f"run record: {rows} rows of samples, the figures need at least 2")
     true_error = has_truth(columns)
     who = "true" if true_error else "est"
-    values = (
-        _error_figures(columns)
-        | _motion_figures(columns, who)
-        | _effort_figures(columns)
-        | _sliding_figures(columns)
-        | sliding.figures(columns, who, law or LawFacts())
-        | _timing_figures(columns, link or LinkStats())
-    )
+    with np.errstate(over="ignore", invalid="ignore"):  # of a damaged record: they are inf or NaN
+        values = (
+            _error_figures(columns)
+            | _motion_figures(columns, who)
+            | _effort_figures(columns)
+            | _sliding_figures(columns)
+            | sliding.figures(columns, who, law or LawFacts())
+            | _timing_figures(columns, link or LinkStats())
+        )
     return Figures("truth" if true_error else "estimate", values)
 
 

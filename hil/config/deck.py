@@ -14,6 +14,7 @@ from hil.config.control import OuterLawName
 from hil.config.events import Disturbance
 from hil.config.load import build, load_scenario, put_value, read_tree
 from hil.config.scenario import Scenario
+from hil.core.files import is_file
 
 CALM = "calm"
 
@@ -133,8 +134,8 @@ def _cells(scenarios: Sequence[str], conditions: Sequence[str]) -> list[Cell]:
 
 def _beside(folder: Path, name: Any) -> Any:
     """Return the path of a scenario's file that is not here but beside the deck; else as it is."""
-    if isinstance(name, str) and name.endswith(".toml") and not Path(name).is_file():
-        return str(folder / name) if (folder / name).is_file() else name
+    if isinstance(name, str) and name.endswith(".toml") and not is_file(Path(name)):
+        return str(folder / name) if is_file(folder / name) else name
     return name
 
 

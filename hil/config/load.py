@@ -22,7 +22,7 @@ from hil.config.robot import RobotConfig
 from hil.config.scenario import Scenario
 from hil.config.with_robot import lifted, refuse_all_but_gains
 from hil.core.errors import BadInput
-from hil.core.files import parse_toml, read_text
+from hil.core.files import is_file, parse_toml, read_text
 from hil.core.registry import is_file_name
 
 # Values that would be laid aside: the command's own option (in a campaign, its list) decides them.
@@ -208,7 +208,7 @@ def _read_text(name_or_path: str, kind: str) -> tuple[str, str, Path | None]:
         return item.read_text(encoding="utf-8"), item.name, None
     path = Path(name_or_path)
     one = kind.removesuffix("s")
-    if not path.is_file():
+    if not is_file(path):
         names = builtin_names(kind)
         near = difflib.get_close_matches(name_or_path, names, n=2)
         known = f"; built in: {', '.join(names)}" if names else ""

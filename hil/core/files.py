@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tomllib
 from collections.abc import Iterator
@@ -9,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from hil.core.errors import BadInput
+from hil.core.errors import BadInput, HilError, RigFault
 
 PART = ".part"  # ends the name of a file in work
 TEXT_BYTES = 4_000_000  # scenarios, robots, laws, mappings: the largest shipped one has 12 KB
@@ -43,6 +44,19 @@ def replacing(path: Path) -> Iterator[Path]:
     except BaseException:
         part.unlink(missing_ok=True)
         raise
+
+
+# A disk, or a limit, that is at its end.
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+
+
+def unwritable(what: str, error: OSError) -> HilError:
+    """Return what is to be raised for a file that cannot be written, which `what` names.
+
+    A path that is wrong is the caller's affair (BadInput), a disk that is full is not (RigFault).
+    """
+    kind = RigFault if error.errno in _FULL else BadInput
+    return kind(f"{what}: cannot be written: {error.strerror or error}")
 
 
 def read_toml(path: Path, what: str = "") -> dict[str, Any]:
@@ -85,6 +99,14 @@ def read_text(path: Path, limit_bytes: int = TEXT_BYTES, encoding: str = "utf-8"
     """Return a text file with plain line ends; raises BadInput, OSError, UnicodeDecodeError."""
     text = read_bounded(path, limit_bytes).decode(encoding)
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def is_file(path: Path) -> bool:
+    """Say whether there is such a file; there is none of a name that is too long for any."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
 
 
 def check_size(path: Path, limit_bytes: int = LOG_BYTES) -> None:

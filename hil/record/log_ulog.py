@@ -84,7 +84,8 @@ def _topics(data: list[Any]) -> dict[str, Topic]:
     """Return every instance of every topic; the plain name is the first instance's."""
     found: dict[str, Topic] = {}
     for item in sorted(data, key=lambda item: (item.name, item.multi_id)):
-        fields = {name: np.asarray(values, dtype=np.float64) for name, values in item.data.items()}
+        with np.errstate(invalid="ignore"):  # a damaged float may be a NaN that signals
+            fields = {name: np.asarray(x, dtype=np.float64) for name, x in item.data.items()}
         topic = Topic(fields["timestamp"] * 1e-6, fields)
         found[f"{item.name}[{item.multi_id}]"] = topic
         found.setdefault(item.name, topic)

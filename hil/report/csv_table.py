@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.analysis.metrics import all_metrics
-from hil.core.errors import BadInput
-from hil.core.files import replace_file
+from hil.core.files import replace_file, unwritable
 from hil.core.text import visible
 
 if TYPE_CHECKING:
@@ -48,4 +47,4 @@ def write_csv(path: Path, runs: Sequence[RunRecord]) -> None:
     try:
         replace_file(path, out.getvalue().encode())
     except OSError as error:
-        raise BadInput(f"--csv {path}: cannot be written: {error.strerror}") from None
+        raise unwritable(f"--csv {path}", error) from None

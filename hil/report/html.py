@@ -12,9 +12,8 @@ import jinja2
 from markupsafe import Markup
 
 from hil.analysis.metrics import all_metrics
-from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME, Metric, metric_of
-from hil.core.files import replace_file
+from hil.core.files import replace_file, unwritable
 from hil.core.text import visible
 from hil.report import figures as draw
 from hil.report.assumptions import Assumption, assumptions, gain_assumptions
@@ -48,7 +47,7 @@ def write_report(
     """Write the report of one or several comparisons to `path`, atomically.
 
     `command` is the command line that made it; `circle` adds the section on ideal sensing.
-    Raises BadInput when `path` cannot be written.
+    Raises BadInput when `path` cannot be written, RigFault when the disk is full.
     """
     page = render(
         comparisons, command=command, title=title, circle=circle, repeats=repeats
@@ -56,7 +55,7 @@ def write_report(
     try:
         replace_file(path, page)
     except OSError as error:
-        raise BadInput(f"report {path}: cannot be written: {error.strerror}") from None
+        raise unwritable(f"report {path}", error) from None
 
 
 def render(

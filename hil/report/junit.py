@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hil.core.errors import BadInput
-from hil.core.files import replace_file
+from hil.core.files import replace_file, unwritable
 from hil.core.text import visible
 
 if TYPE_CHECKING:
@@ -146,4 +145,4 @@ def _write(path: Path, suites: ET.Element) -> None:
     try:
         replace_file(path, ET.tostring(suites, encoding="utf-8", xml_declaration=True) + b"\n")
     except OSError as error:
-        raise BadInput(f"--junit {path}: cannot be written: {error.strerror}") from None
+        raise unwritable(f"--junit {path}", error) from None

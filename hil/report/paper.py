@@ -18,7 +18,7 @@ import matplotlib as mpl
 import numpy as np
 
 from hil.core.errors import BadInput
-from hil.core.files import replace_file
+from hil.core.files import replace_file, unwritable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,7 +80,7 @@ def _write(path: Path, data: bytes) -> None:
     try:
         replace_file(path, data)
     except OSError as error:
-        raise BadInput(f"--figures: {path}: cannot be written: {error.strerror}") from None
+        raise unwritable(f"--figures: {path}", error) from None
 
 
 def _stack(figure: Figure) -> None:

@@ -16,6 +16,7 @@ import atexit
 import os
 import signal
 import threading
+from contextlib import suppress
 from types import FrameType
 from typing import Any, NoReturn, Self
 
@@ -70,7 +71,8 @@ def _noted(number: int) -> Stopped:
 def _stop(number: int, frame: FrameType | None) -> NoReturn:
     stopped = _noted(number)
     if _imports(frame):  # nothing is begun, and compiled modules do not survive an exception there
-        os.write(2, f"hil: stopped by {stopped}\n".encode())
+        with suppress(OSError):  # a lost terminal takes no word
+            os.write(2, f"hil: stopped by {stopped}\n".encode())
         os._exit(128 + number)
     raise stopped
 

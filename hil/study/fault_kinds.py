@@ -15,6 +15,7 @@ INSTANTS = {
     "closing": 0.0,
 }
 CLOSING = "closing"
+TRAVEL_M = 1.0
 # What two faults of the wheels may both be told as; each row takes as few of them as its evidence allows.
 _APART = "camera and wheels disagree"
 _SILENT = "no heartbeat"  # of a board that is not there when the host connects
@@ -27,7 +28,8 @@ class FaultRow:
     `pulses_s` are (start, end) after the instant, end None for ever. `fields` are further ones of the
     fault. `loads` are disturbances of the same times, each (target, amplitude). `settings` are in force
     from the begin to the end of a run, whatever the instant. A `slow` one is told and stops nothing,
-    unless the wheel stands: then it is a stall. No fault begins before `first_s`.
+    unless the wheel stands: then it is a stall. No fault begins before `first_s`. `travel_m` is the
+    most that the robot may travel until it is stopped.
     """
 
     name: str
@@ -41,6 +43,7 @@ class FaultRow:
     loads: tuple[tuple[str, float], ...] = ()
     camera: str = "pose"
     first_s: float = 0.0
+    travel_m: float = TRAVEL_M
 
     def overrides(self, start_s: float) -> list[str]:
         """Return the settings of a run with this fault from `start_s` on."""
@@ -76,7 +79,8 @@ ROWS = (
              f"STALL_LEFT|encoder intermittent: left|{_APART}", _FOUR_TIMES),
     FaultRow("encoder phases swapped", "swapped_phases", "right", f"RUNAWAY_RIGHT|{_APART}"),
     FaultRow("encoder wires noisy", "encoder_noise", "left", "ENCODER|encoder"),
-    FaultRow("gear slips to 0.4", "gear_slip", "left", _APART),
+    FaultRow("gear slips to 0.4", "gear_slip", "left", _APART,
+             travel_m=1.5),  # from power-up the camera makes it good, to the turn at the goal
     FaultRow("motor reversed", "motor_reversed", "left", "RUNAWAY_LEFT"),
     FaultRow("motor stuck", "motor_stuck", "left", "motor stuck: left|STALL_LEFT"),
     FaultRow("motor weak", "motor_weak", "left", "side weak: left|STALL_LEFT", slow=True),

@@ -13,13 +13,13 @@ from pathlib import Path
 from queue import Empty
 from typing import TYPE_CHECKING
 
-from hil.core.errors import BadInput, RigFault
+from hil.core.errors import BadInput, RigFault, Stopped
 from hil.record import layout
 from hil.record.manifest import Manifest, read_manifest
 from hil.record.reader import altered_files
 from hil.rigs.opening import is_simulated
 from hil.runs.execute import RunSpec
-from hil.study.work_folder import Terminated, set_aside
+from hil.study.work_folder import set_aside
 from hil.study.workers import when_parent_is_gone
 
 if TYPE_CHECKING:
@@ -68,6 +68,8 @@ def _unfinished(folder: Path) -> str | None:
     manifest = manifest_of(folder)
     if manifest is None:
         return f"{layout.MANIFEST} is missing or damaged"
+    if manifest.outcome == "fault" and not manifest.files:
+        return "its record could not be finished"
     if manifest.outcome not in {"complete", "fault"}:
         return "cut off before its end" if manifest.outcome == "running" else manifest.outcome
     damaged = [line for line in altered_files(folder, manifest) if not line.startswith(_TO_LOOK_AT)]
@@ -113,8 +115,9 @@ def _run_side_by_side(specs: Sequence[RunSpec], update: Update, workers: int) ->
         _follow(futures, news, update)
         for future in futures:
             future.result()
-    except Terminated:  # Ctrl-C reaches the workers by itself
-        stop.set()
+    except Stopped as stopped:
+        if stopped.number != signal.SIGINT:  # Ctrl-C reaches the workers by itself
+            stop.set()
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
@@ -138,7 +141,9 @@ def _start_worker(news: Queue[tuple[str, float]], stop: Event) -> None:
     global _news  # noqa: PLW0603 - the pool hands an initialiser's findings on in no other way
     _news = news
     _idle.set()
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # the parent passes it on by `stop`
+    for name in ("SIGTERM", "SIGHUP"):  # the parent passes them on by `stop`
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
     when_parent_is_gone(_stop_run)
     threading.Thread(target=_stop_when_told, args=(stop,), daemon=True).start()
 

@@ -22,6 +22,7 @@ from hil.record.recorder import Recorder
 from hil.replays.exact import replay
 from hil.runs.execute import RunSpec, execute, exit_status
 from tests.ends import drawn
+from tests.ends.commands import COMMANDS
 
 pytestmark = pytest.mark.realtime
 
@@ -35,10 +36,10 @@ def spec(out: Path, *overrides: str, duration_s: float = 1.0, estimator: str = "
     return RunSpec(scenario, "twin", "pose", "asg-ism", "asg-ism", 1, out, rerun=False)
 
 
-@pytest.mark.parametrize("kind", drawn.KINDS)
+@pytest.mark.parametrize("kind", drawn.kinds())
 def test_the_real_process_ended_at_a_drawn_instant(tmp_path: Path, kind: str) -> None:
     """A short form of `python -m tests.ends.drawn`: one end of each kind."""
-    done = drawn.end(kind, random.Random(f"short/{kind}"), tmp_path / "run")
+    done = drawn.end(COMMANDS["run"], kind, random.Random(f"short/{kind}"), tmp_path)
     assert not done.flaws, done
 
 

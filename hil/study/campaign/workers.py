@@ -97,7 +97,7 @@ def in_processes(
                 else:
                     lost_in_a_row += 1
                     yield _given_up(job, deaths[repr(job)], lost, lost_in_a_row)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, GeneratorExit):  # nobody wants the rest
             _end_workers()
             raise
         finally:
