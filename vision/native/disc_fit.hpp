@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "camera.hpp"
+#include "claim.hpp"
 #include "picture.hpp"
 #include "rims.hpp"
 #include "symmetric.hpp"
@@ -44,7 +45,7 @@ class RimFitter {
     Vec2 from_px;  // centre before the step
     Edges edges;
     std::array<Move, kRays> rows;
-    Round shift;
+    Round shift, scale;  // `scale`: from samples to the units of `rows`
     Mask keep;
     Move move;
   };
@@ -53,8 +54,8 @@ class RimFitter {
   std::optional<Vec2> centred(const Picture& picture, Vec2 px, const Colour& weights) const;
   bool step(const Picture& picture, Vec2 px, const Colour& weights, const Mask* keep, Step& done) const;
   Mask within(const Picture& picture, Vec2 px, const Shape& shape) const;
-  // The figures of a fitted disc, its covariance for a noise of 1 px; `variance` is the noise's.
-  Disc disc(const Picture& picture, const Step& step, double& variance) const;
+  // The figures of a fitted disc but for its covariance, and what that rests on.
+  Disc disc(const Picture& picture, const Step& step, Evidence& evidence) const;
 
   Camera camera_;
   double radius_m_, height_m_;

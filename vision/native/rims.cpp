@@ -18,6 +18,13 @@ constexpr double kStepShare = 0.3;
 constexpr double kShiftShare = 0.8;
 constexpr double kResponseMinDn = 6.0;
 constexpr double kGainMin = 0.02;
+// Ground so many deviations off that round most of the disc may be another thing, which blur has
+// brought near. Its noise is that between rays so far apart that they share no pixels.
+constexpr double kUsualSpreads = 2.0;
+constexpr int kStepRays = 3;
+constexpr double kOwnMinDn = 0.3;
+// A disc's level inside may fall by so much with light and shade before it is taken for covered.
+constexpr double kDarkFree = 0.1;
 
 // Means over neighbouring rays, an odd number of them.
 Round about(const Round& values, int rays) {
@@ -36,7 +43,8 @@ Round about(const Round& values, int rays) {
 
 // Level, gain and shift of the profiles of one length.
 struct Length {
-  Round rise, level, gain, shift, inner;
+  Round rise, level, gain, shift, inner, low, high, strange;
+  double usual_low, usual_high;
 };
 
 // Running sums of the profile of each ray, kRays x (samples + 1).
@@ -54,7 +62,7 @@ std::vector<double> running(const std::vector<float>& response, int samples) {
 }
 
 struct Swing {
-  Round rise, swing, inner;
+  Round rise, swing, inner, outer, low, high;
 };
 
 // How far between its two levels the mean of each profile is: -1 all outside, 1 all inside.
@@ -74,6 +82,9 @@ Swing swing(const std::vector<float>& response, const std::vector<double>& sums,
   const Round high = about(inner, kLevelRays);
   Swing found;
   found.inner = inner;
+  found.outer = outer;
+  found.low = low;
+  found.high = high;
   for (int ray = 0; ray < kRays; ++ray) {
     found.rise[ray] = high[ray] - low[ray];
     found.swing[ray] = 2.0 * (between[ray] - low[ray]) / std::max(found.rise[ray], 1.0) - 1.0;
@@ -90,6 +101,28 @@ void take_better_side(Round& level, Round& gain) {
     level[ray] = level[across] = level[from];
     gain[ray] = gain[across] = gain[from];
   }
+}
+
+double median(Round values) {
+  std::nth_element(values.begin(), values.begin() + kRays / 2, values.end());
+  return values[kRays / 2];
+}
+
+// How far the ground outside each ray is from that round most of the disc, beyond what its noise lets
+// it be, in units of the noise of one sample; `level` samples of a ray make its own ground, `outer`.
+Round strangeness(const Round& outer, const Round& low, double usual, int level) {
+  Round away, step;
+  for (int ray = 0; ray < kRays; ++ray) {
+    away[ray] = std::abs(low[ray] - usual);
+    step[ray] = std::abs(outer[ray] - outer[(ray + kStepRays) % kRays]);
+  }
+  const double own_dn = std::max(1.4826 / std::sqrt(2.0) * median(step), kOwnMinDn);
+  const double free_dn = kUsualSpreads * own_dn / std::sqrt(static_cast<double>(kLevelRays) / kStepRays);
+  const double sample_dn = own_dn * std::sqrt(static_cast<double>(level));
+  for (double& one : away) {
+    one = std::max(one - free_dn, 0.0) / sample_dn;
+  }
+  return away;
 }
 
 }  // namespace
@@ -120,6 +153,11 @@ Edges Profiles::edges(const std::vector<float>& response) const {
     const Swing out = swing(response, sums, n, half_ + 1, e, level_[k]);
     own.rise = here.rise;
     own.inner = here.inner;
+    own.low = here.low;
+    own.high = here.high;
+    own.usual_low = median(own.low);
+    own.usual_high = median(own.high);
+    own.strange = strangeness(here.outer, own.low, own.usual_low, level_[k]);
     Round slope;
     for (int ray = 0; ray < kRays; ++ray) {
       slope[ray] = (in.swing[ray] - out.swing[ray]) * (0.5 * e);
@@ -141,7 +179,8 @@ Edges Profiles::edges(const std::vector<float>& response) const {
       const double gain = std::clamp(lengths[k].gain[ray], kGainMin, 1.0);
       // Levels are shared by neighbouring rays, which does not average them over a whole disc.
       const double scatter = 2.0 * edge_[k] * std::sqrt(0.5 / edge_[k] + 0.5 / level_[k]);
-      const double noise = scatter / lengths[k].level[ray];
+      const double moved = edge_[k] * lengths[k].strange[ray];
+      const double noise = std::hypot(scatter, moved) / lengths[k].level[ray];
       if (gain / noise > most) {
         most = gain / noise;
         best[ray] = k;
@@ -153,6 +192,10 @@ Edges Profiles::edges(const std::vector<float>& response) const {
     step[ray] = own.rise[ray];
     inner[ray] = own.inner[ray];
     found.shift[ray] = own.shift[ray];
+    const double high = own.usual_high;
+    const double dark = std::min((own.high[ray] - high) / std::max(high, 1.0) + kDarkFree, 0.0);
+    found.cover[ray] = edge_[best[ray]] * dark;
+    found.ground[ray] = edge_[best[ray]] * (own.low[ray] - own.usual_low) / own.level[ray];
   }
   Round ordered = inner;
   std::nth_element(ordered.begin(), ordered.begin() + 3 * kRays / 4, ordered.end());
