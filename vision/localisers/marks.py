@@ -33,6 +33,7 @@ GROWTH_DOUBT = 0.5  # more where the rim is rough: noise, blur longer than the p
 RESIDUAL_MAX = 0.09  # of the radius
 RESIDUAL_FREE_PX = 0.25  # sensor noise
 DISTANCE_TOLERANCE = 0.04
+SQUARE_MAX = 0.6  # of both marks: squares of the same width have 0.66 to 0.9, discs to 0.55
 
 # How many degrees of freedom the discs' own claims are worth against that of their distance.
 MISFIT_FREEDOM = 4.0
@@ -209,6 +210,8 @@ class MarkLocaliser:
             why = self._refusal(disc)
             if why:
                 return None, f"{name} mark: {why}"
+        if min(disc.square for disc in discs) > SQUARE_MAX:
+            return None, "both marks have four corners"
         at = self._model.floor_point
         front, rear = (at(disc.u_px, disc.v_px, self._height_m) for disc in discs)
         gap_m = math.dist(front, rear) - self._distance_m

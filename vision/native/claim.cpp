@@ -17,7 +17,7 @@ constexpr double kWhiteOdd = 1.1, kWhiteOddPx = 8.0, kWhiteOddPower = 2.6;
 constexpr double kPatches = 1.45;
 constexpr double kPatchSlope = 0.35;
 // Blur leaves what varies twice, alike on both sides; a share of it is not alike.
-constexpr double kTwice = 0.11;
+constexpr double kTwice = 0.13;
 constexpr double kTwiceFree = 2.0;
 constexpr double kTwiceFreeFast = 3.0;
 // Of a rim of which a share is seen; and with a profile's gain (`Edges::gain`).
@@ -45,6 +45,17 @@ const std::array<Wave, kSlowTurns + 1>& waves() {
   return kept;
 }
 
+// The square of what varies so many times round.
+double power_of(const Round& values, int turns) {
+  double along = 0.0;
+  double across = 0.0;
+  for (int ray = 0; ray < kRays; ++ray) {
+    along += values[ray] * waves()[turns][0][ray];
+    across += values[ray] * waves()[turns][1][ray];
+  }
+  return along * along + across * across;
+}
+
 // Variance of the noise that moves a centre, px^2 a ray.
 double centre_noise(const Evidence& own, const Evidence& other) {
   const double radius = std::max(own.radius_px, 4.0);
@@ -70,17 +81,23 @@ RimNoise rim_noise(const Round& rest, int kept) {
     squares += r * r;
   }
   for (int turns = 0; turns <= kSlowTurns; ++turns) {
-    double along = 0.0;
-    double across = 0.0;
-    for (int ray = 0; ray < kRays; ++ray) {
-      along += rest[ray] * waves()[turns][0][ray];
-      across += rest[ray] * waves()[turns][1][ray];
-    }
-    power[turns] = (along * along + across * across) / kept;
+    power[turns] = power_of(rest, turns) / kept;
     slow += (turns == 0 ? 1.0 : 2.0) * power[turns];
   }
   const double left = std::max(kRays * squares / kept - slow, 0.0);
   return {left / (kRays - 1 - 2 * kSlowTurns), (power[3] + power[5] + power[7]) / 3.0, power[2]};
+}
+
+double squareness(const Round& off) {
+  double mean = 0.0;
+  for (const double o : off) {
+    mean += o / kRays;
+  }
+  double squares = 0.0;
+  for (const double o : off) {
+    squares += (o - mean) * (o - mean);
+  }
+  return 2.0 * power_of(off, 4) / std::max(kRays * squares, 1e-12);
 }
 
 std::array<double, 3> claim(const Evidence& own, const Evidence& other) {

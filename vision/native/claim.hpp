@@ -26,6 +26,9 @@ struct Evidence {
 // `rest` is zero for the rays that are left out; `kept` are in.
 RimNoise rim_noise(const Round& rest, int kept);
 
+// The share, 0 to 1, of edges off a fitted disc that varies four times round: a square's is near 1.
+double squareness(const Round& off);
+
 // The covariance (uu, uv, vv) of a disc's centre, px^2; both discs are of one picture and share its noise.
 std::array<double, 3> claim(const Evidence& own, const Evidence& other);
 

@@ -24,6 +24,7 @@ constexpr double kOutlierSigmas = 3.0;
 // Of five rays side by side, more of which must have an edge for that in the middle.
 constexpr int kBesideMin = 3;
 constexpr double kEdgeSigmaMinPx = 0.05;
+constexpr double kOffMax = 0.4;  // of the radius: a square's corners
 // Doubt of the radius before the fit, relative, as a pull towards the known one.
 constexpr double kRadiusSigma = 0.02;
 constexpr double kRadiusPull = (0.15 / kRadiusSigma) * (0.15 / kRadiusSigma);
@@ -259,6 +260,7 @@ bool RimFitter::step(const Picture& picture, Vec2 px, const Colour& weights, con
 Disc RimFitter::disc(const Picture& picture, const Step& step, Evidence& evidence) const {
   const auto& [du, dv, growth] = step.move;
   Round rest = {};
+  Round off;
   std::vector<float> ratios;
   double squares = 0.0;
   double gain = 0.0;
@@ -273,8 +275,10 @@ Disc RimFitter::disc(const Picture& picture, const Step& step, Evidence& evidenc
     return sum;
   };
   for (int ray = 0; ray < kRays; ++ray) {
+    const double left = step.shift[ray] - dot3(step.rows[ray], step.move);
+    off[ray] = std::clamp(left, -kOffMax * step.shape.radius_px, kOffMax * step.shape.radius_px);
     if (step.keep[ray]) {
-      rest[ray] = step.shift[ray] - dot3(step.rows[ray], step.move);
+      rest[ray] = left;
       squares += rest[ray] * rest[ray];
       gain += step.edges.gain[ray];
       ratios.push_back(brightness(ray, profiles_.ground()) /
@@ -300,7 +304,8 @@ Disc RimFitter::disc(const Picture& picture, const Step& step, Evidence& evidenc
               std::sqrt(squares / kept),
               {},
               step.edges.typical_dn,
-              ratios[kept / 2]};
+              ratios[kept / 2],
+              squareness(off)};
 }
 
 std::optional<std::array<Disc, 2>> RimFitter::fit(const Picture& picture,

@@ -25,6 +25,7 @@ constexpr int kStepRays = 3;
 constexpr double kOwnMinDn = 0.3;
 // A disc's level inside may fall by so much with light and shade before it is taken for covered.
 constexpr double kDarkFree = 0.1;
+constexpr double kLeanMax = 0.1;
 
 // Means over neighbouring rays, an odd number of them.
 Round about(const Round& values, int rays) {
@@ -39,6 +40,19 @@ Round about(const Round& values, int rays) {
     sum += values[(i + side + 1) % kRays] - values[(i - side + kRays) % kRays];
   }
   return means;
+}
+
+// Cosine and sine of a ray's angle.
+const std::array<Round, 2>& turn() {
+  static const std::array<Round, 2> kept = [] {
+    std::array<Round, 2> both;
+    for (int ray = 0; ray < kRays; ++ray) {
+      both[0][ray] = std::cos(6.283185307179586 * ray / kRays);
+      both[1][ray] = std::sin(6.283185307179586 * ray / kRays);
+    }
+    return both;
+  }();
+  return kept;
 }
 
 // Level, gain and shift of the profiles of one length.
@@ -61,13 +75,34 @@ std::vector<double> running(const std::vector<float>& response, int samples) {
   return sums;
 }
 
+// Levels with their first turn round the disc grown by a share `lean`: light that falls to one side does
+// so on from where the levels are taken out to the rim. One that differs by much is a shade or a cover.
+Round leaning(const Round& levels, double lean) {
+  double mean = 0.0;
+  double along = 0.0;
+  double across = 0.0;
+  for (int ray = 0; ray < kRays; ++ray) {
+    mean += levels[ray] / kRays;
+    along += levels[ray] * turn()[0][ray] * (2.0 / kRays);
+    across += levels[ray] * turn()[1][ray] * (2.0 / kRays);
+  }
+  if (std::hypot(along, across) > kLeanMax * mean) {
+    return levels;
+  }
+  Round leant;
+  for (int ray = 0; ray < kRays; ++ray) {
+    leant[ray] = levels[ray] + lean * (along * turn()[0][ray] + across * turn()[1][ray]);
+  }
+  return leant;
+}
+
 struct Swing {
   Round rise, swing, inner, outer, low, high;
 };
 
 // How far between its two levels the mean of each profile is: -1 all outside, 1 all inside.
 Swing swing(const std::vector<float>& response, const std::vector<double>& sums, int samples, int middle,
-            int edge, int level) {
+            int edge, int level, double lean) {
   Round inner, outer, between;
   for (int ray = 0; ray < kRays; ++ray) {
     const double* s = &sums[ray * (samples + 1)];
@@ -79,7 +114,7 @@ Swing swing(const std::vector<float>& response, const std::vector<double>& sums,
     between[ray] = (s[last + 1] - s[first] - 0.5 * (r[first] + r[last])) * (0.5 / edge);
   }
   const Round low = about(outer, kLevelRays);
-  const Round high = about(inner, kLevelRays);
+  const Round high = leaning(about(inner, kLevelRays), lean);
   Swing found;
   found.inner = inner;
   found.outer = outer;
@@ -138,6 +173,9 @@ Profiles::Profiles(double radius_px) : half_(0) {
     edge_[k] = static_cast<int>(std::ceil(std::max(reach * radius_px, kReachMinPx)));
     level_[k] = std::max(2, static_cast<int>(std::nearbyint(level * radius_px)));
     half_ = std::max(half_, edge_[k] + level_[k] + 1);
+    // Longer ones are for blurred rims, whose levels fall to one side with the blur and not with light.
+    const double levels_at = radius_px - edge_[k] - 0.5 * level_[k];
+    lean_[k] = k == 0 && levels_at > 0.5 * radius_px ? (radius_px - 0.5 * edge_[k]) / levels_at - 1.0 : 0.0;
   }
 }
 
@@ -148,9 +186,9 @@ Edges Profiles::edges(const std::vector<float>& response) const {
   for (int k = 0; k < kLengths; ++k) {
     Length& own = lengths[k];
     const int e = edge_[k];
-    const Swing here = swing(response, sums, n, half_, e, level_[k]);
-    const Swing in = swing(response, sums, n, half_ - 1, e, level_[k]);
-    const Swing out = swing(response, sums, n, half_ + 1, e, level_[k]);
+    const Swing here = swing(response, sums, n, half_, e, level_[k], lean_[k]);
+    const Swing in = swing(response, sums, n, half_ - 1, e, level_[k], lean_[k]);
+    const Swing out = swing(response, sums, n, half_ + 1, e, level_[k], lean_[k]);
     own.rise = here.rise;
     own.inner = here.inner;
     own.low = here.low;

@@ -48,6 +48,7 @@ class Profiles {
 
  private:
   std::array<int, kLengths> edge_, level_;
+  std::array<double, kLengths> lean_;
   int half_;
 };
 
