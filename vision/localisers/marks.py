@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from hil.config.camera import MarkConfig, MarksConfig
 from hil.core.types import Pose, PoseMeasurement
-from vision.camera import CameraModel
+from vision.camera import CameraModel, longest_px
 from vision.disc_fit import Disc, Marks, RimFitter
 from vision.mark_search import CHROMA_BASIS, Centres, MarkSearch, Point, Window
 from vision.pose_fit import weighted_pose
@@ -41,6 +41,7 @@ QUALITY_RESIDUAL = 0.06  # of the radius
 # What is hardly within each limit is no robot: the least of extreme blur and noise has 0.17.
 QUALITY_MIN = 0.12
 SAME_PLACE_M = 0.02
+STRIP_PX = 320_000  # those of 640 x 480, which take some 3 ms
 TWO_PLACES = "two places look like the robot"
 
 
@@ -124,16 +125,14 @@ class MarkLocaliser:
         return self._model.width_px, self._model.height_px
 
     @property
+    def strip_px(self) -> int:
+        """How many pixels are searched in one frame where the search is spread over several."""
+        return STRIP_PX
+
+    @property
     def span_px(self) -> int:
         """How long the robot's marks and their rims are together in the image, at most."""
-        width, height = self.size_px
-        spans = [0.0]
-        for u in (0.0, 0.5 * width, float(width)):
-            for v in (0.0, 0.5 * height, float(height)):
-                slope = self._model.floor_jacobian(u, v, self._height_m)
-                if np.isfinite(slope).all():
-                    spans.append(1.0 / float(np.linalg.norm(slope, -2)))
-        return math.ceil(max(spans) * (self._distance_m + 4.0 * self._radius_m))
+        return longest_px(self._model, self._height_m, self._distance_m + 4.0 * self._radius_m)
 
     def _place(self, predicted: Pose | None) -> Point | None:
         """Return where our robot is expected among several alike; None where nobody said."""
