@@ -10,11 +10,11 @@ constexpr double kTurn = 6.283185307179586;
 constexpr int kSlowTurns = 8;
 // White noise of pixels, measured on 12 radii from 4 to 32 px: how much more of it moves a centre than
 // is left in `fast`, and how much more is in `odd`; rays share pixels, the more so on a small disc.
-constexpr double kWhiteCentre = 1.65, kWhiteCentrePx = 9.0, kWhiteCentrePower = 3.2;
+constexpr double kWhiteCentre = 1.52, kWhiteCentrePx = 9.0, kWhiteCentrePower = 3.2;
 constexpr double kWhiteOdd = 1.1, kWhiteOddPx = 8.0, kWhiteOddPower = 2.6;
 // Noise beyond that is of patches larger than a pixel (blocks of a JPEG, colour at half resolution,
 // smear): the larger they are, the more of it varies just once, which the fit has taken up.
-constexpr double kPatches = 1.45;
+constexpr double kPatches = 1.55;
 constexpr double kPatchSlope = 0.35;
 // Blur leaves what varies twice, alike on both sides; a share of it is not alike.
 constexpr double kTwice = 0.13;

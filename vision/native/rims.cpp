@@ -26,6 +26,7 @@ constexpr double kOwnMinDn = 0.3;
 // A disc's level inside may fall by so much with light and shade before it is taken for covered.
 constexpr double kDarkFree = 0.1;
 constexpr double kLeanMax = 0.1;
+constexpr double kLeanNoise = 0.33;  // of a ray's own variance: twice that of a first turn
 
 // Means over neighbouring rays, an odd number of them.
 Round about(const Round& values, int rays) {
@@ -75,9 +76,25 @@ std::vector<double> running(const std::vector<float>& response, int samples) {
   return sums;
 }
 
+double median(Round values) {
+  std::nth_element(values.begin(), values.begin() + kRays / 2, values.end());
+  return values[kRays / 2];
+}
+
+// Noise of what each ray has of its own, from rays so far apart that they share no pixels.
+double ray_noise_dn(const Round& values) {
+  Round step;
+  for (int ray = 0; ray < kRays; ++ray) {
+    step[ray] = std::abs(values[ray] - values[(ray + kStepRays) % kRays]);
+  }
+  return 1.4826 / std::sqrt(2.0) * median(step);
+}
+
 // Levels with their first turn round the disc grown by a share `lean`: light that falls to one side does
 // so on from where the levels are taken out to the rim. One that differs by much is a shade or a cover.
-Round leaning(const Round& levels, double lean) {
+// So does one within the noise of the rays' own levels, `inner`, which would only be added to the rest.
+Round leaning(const Round& inner, double lean) {
+  const Round levels = about(inner, kLevelRays);
   double mean = 0.0;
   double along = 0.0;
   double across = 0.0;
@@ -86,12 +103,15 @@ Round leaning(const Round& levels, double lean) {
     along += levels[ray] * turn()[0][ray] * (2.0 / kRays);
     across += levels[ray] * turn()[1][ray] * (2.0 / kRays);
   }
-  if (std::hypot(along, across) > kLeanMax * mean) {
+  const double square = along * along + across * across;
+  const double own_dn = ray_noise_dn(inner);
+  const double sure = 1.0 - kLeanNoise * own_dn * own_dn / std::max(square, 1e-12);
+  if (lean == 0.0 || sure <= 0.0 || square > kLeanMax * kLeanMax * mean * mean) {
     return levels;
   }
   Round leant;
   for (int ray = 0; ray < kRays; ++ray) {
-    leant[ray] = levels[ray] + lean * (along * turn()[0][ray] + across * turn()[1][ray]);
+    leant[ray] = levels[ray] + sure * lean * (along * turn()[0][ray] + across * turn()[1][ray]);
   }
   return leant;
 }
@@ -114,7 +134,7 @@ Swing swing(const std::vector<float>& response, const std::vector<double>& sums,
     between[ray] = (s[last + 1] - s[first] - 0.5 * (r[first] + r[last])) * (0.5 / edge);
   }
   const Round low = about(outer, kLevelRays);
-  const Round high = leaning(about(inner, kLevelRays), lean);
+  const Round high = leaning(inner, lean);
   Swing found;
   found.inner = inner;
   found.outer = outer;
@@ -138,20 +158,14 @@ void take_better_side(Round& level, Round& gain) {
   }
 }
 
-double median(Round values) {
-  std::nth_element(values.begin(), values.begin() + kRays / 2, values.end());
-  return values[kRays / 2];
-}
-
 // How far the ground outside each ray is from that round most of the disc, beyond what its noise lets
 // it be, in units of the noise of one sample; `level` samples of a ray make its own ground, `outer`.
 Round strangeness(const Round& outer, const Round& low, double usual, int level) {
-  Round away, step;
+  Round away;
   for (int ray = 0; ray < kRays; ++ray) {
     away[ray] = std::abs(low[ray] - usual);
-    step[ray] = std::abs(outer[ray] - outer[(ray + kStepRays) % kRays]);
   }
-  const double own_dn = std::max(1.4826 / std::sqrt(2.0) * median(step), kOwnMinDn);
+  const double own_dn = std::max(ray_noise_dn(outer), kOwnMinDn);
   const double free_dn = kUsualSpreads * own_dn / std::sqrt(static_cast<double>(kLevelRays) / kStepRays);
   const double sample_dn = own_dn * std::sqrt(static_cast<double>(level));
   for (double& one : away) {
