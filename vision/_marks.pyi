@@ -60,6 +60,10 @@ class Disc:
         """Colour response inside its rim."""
 
     @property
+    def square(self) -> float:
+        """How much of what its rim is off varies four times round, 0 to 1; a square has 0.7 and more."""
+
+    @property
     def ground_ratio(self) -> float:
         """Brightness beside it over its own."""
 

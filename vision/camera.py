@@ -249,3 +249,15 @@ def look_at(eye_m: ArrayLike, target_m: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.
         right = np.cross(forward, (0.0, 1.0, 0.0))
     right /= np.linalg.norm(right)
     return np.stack((right, np.cross(forward, right), forward), axis=1)
+
+
+def longest_px(camera: CameraModel, height_m: float, length_m: float) -> int:
+    """Return how long a thing that lies at a height over the floor is in the image, at most."""
+    width, height = camera.width_px, camera.height_px
+    scales = [0.0]
+    for u in (0.0, 0.5 * width, float(width)):
+        for v in (0.0, 0.5 * height, float(height)):
+            slope = camera.floor_jacobian(u, v, height_m)
+            if np.isfinite(slope).all():
+                scales.append(1.0 / float(np.linalg.norm(slope, -2)))
+    return math.ceil(max(scales) * length_m)

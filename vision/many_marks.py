@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from hil.core.types import Pose, PoseMeasurement, wrap_pi
 from vision.camera_setup import camera_model
-from vision.localisers.marks import MarkLocaliser
+from vision.localisers.marks import STRIP_PX, MarkLocaliser
+from vision.mark_search import Window
 from vision.pose_fit import fit_pose
 
 if TYPE_CHECKING:
@@ -58,25 +59,53 @@ class ManyMarks:
 
         Pairs are looked for about `predicted`, and in the whole image when none is there.
         """
-        around = None if predicted is None else self._around(image_bgr, predicted, search_radius_m)
-        found: list[Find] = []
-        reason = ""
-        if predicted is not None and around is not None:
-            found = self._pairs_near(around, predicted, search_radius_m)
-        if not found:
-            found, reason = self._anywhere(image_bgr, search_radius_m)
-        if not found:
-            return PoseMeasurement(None, 0.0, reason, details={"window": 0.0, "marks": 0.0})
-        return self._fitted(found)
+        seen = None if predicted is None else self.near(image_bgr, predicted, search_radius_m)
+        if seen is not None:
+            return seen
+        return self.inside(image_bgr, (0, 0, image_bgr.shape[1], image_bgr.shape[0]), None)
 
-    def _anywhere(self, image_bgr: Image, search_radius_m: float) -> tuple[list[Find], str]:
-        """Return every pair that is found in the whole image, and why the first is not."""
+    def near(
+        self, image_bgr: Image, predicted: Pose, search_radius_m: float
+    ) -> PoseMeasurement | None:
+        """Return the pose at a prediction or within `search_radius_m` of it, None if not there."""
+        around = self._around(image_bgr, predicted, search_radius_m)
+        if around is None:
+            return None
+        found = self._pairs_near(around, predicted, search_radius_m)
+        return self._fitted(found) if found else None
+
+    def inside(
+        self, image_bgr: Image, window: Window, predicted: Pose | None = None
+    ) -> PoseMeasurement:
+        """Return the pose seen in a part of the image."""
         seen = [
-            (pair, localiser.locate(image_bgr, None, search_radius_m))
+            (pair, localiser.inside(image_bgr, window, predicted))
             for pair, localiser in self._pairs
         ]
+        found = [(pair, one) for pair, one in seen if one.pose is not None]
+        if found:
+            return self._fitted(found)
         reason = next((one.reason for _, one in seen if one.pose is None), "")
-        return [(pair, one) for pair, one in seen if one.pose is not None], reason
+        return PoseMeasurement(None, 0.0, reason, details={"window": 0.0, "marks": 0.0})
+
+    def ours(self, finds: list[PoseMeasurement], predicted: Pose | None) -> PoseMeasurement | None:
+        """Return which of several finds is our robot, as a pair's localiser does."""
+        return self._pairs[0][1].ours(finds, predicted)
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of the frames."""
+        return self._model.width_px, self._model.height_px
+
+    @property
+    def span_px(self) -> int:
+        """How long the robot's marks and their rims are together in the image, at most."""
+        return max(localiser.span_px for _, localiser in self._pairs)
+
+    @property
+    def strip_px(self) -> int:
+        """How many pixels are searched in one frame: every pair looks at them."""
+        return STRIP_PX // len(self._pairs)
 
     def _pairs_near(self, image_bgr: Image, predicted: Pose, search_radius_m: float) -> list[Find]:
         """Return the pairs found; one with a mark that is known to be covered is not looked for."""

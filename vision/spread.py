@@ -9,34 +9,67 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from hil.core.types import Pose, PoseMeasurement
-from vision.localisers.marks import SAME_PLACE_M, TWO_PLACES, MarkLocaliser
+from vision.localisers.marks import SAME_PLACE_M, TWO_PLACES
+from vision.localisers.tags import IN_VIEW
 from vision.mark_search import Window
 
 if TYPE_CHECKING:
     from hil.core.rig import Picture
     from vision.tracker import Localiser
 
-# A strip has about this many pixels: those of 640 x 480, which take some 3 ms.
-STRIP_PX = 320_000
 # How far the robot may have gone between two strips that both show it.
 MOVED_M = 0.1
 
 
+@runtime_checkable
+class Parted(Protocol):
+    """A localiser that can look at a part of a frame; all that ship with the harness can.
+
+    `size_px` is the frames' width and height, `span_px` how long the robot is in them at most,
+    `strip_px` how many pixels it searches in a few milliseconds.
+    """
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of the frames."""
+
+    @property
+    def span_px(self) -> int:
+        """How long what is looked for is in the image, at most."""
+
+    @property
+    def strip_px(self) -> int:
+        """How many pixels are searched in one frame."""
+
+    def near(
+        self, image_bgr: Picture, predicted: Pose, search_radius_m: float
+    ) -> PoseMeasurement | None:
+        """Return the pose at a prediction or within `search_radius_m` of it, None if not there."""
+
+    def inside(
+        self, image_bgr: Picture, window: Window, predicted: Pose | None = None
+    ) -> PoseMeasurement:
+        """Return the pose seen in a part of the image."""
+
+    def ours(self, finds: list[PoseMeasurement], predicted: Pose | None) -> PoseMeasurement | None:
+        """Return which of several finds is our robot; None for none, "not seen" for too many."""
+
+
 def spread(localiser: Localiser) -> Localiser:
     """Return a localiser whose frames all take about as long; itself where they do already."""
-    if not isinstance(localiser, MarkLocaliser):
+    if not isinstance(localiser, Parted):
         return localiser
     strips = strips_of(localiser)
     return localiser if len(strips) == 1 else SpreadSearch(localiser, strips)
 
 
-def strips_of(localiser: MarkLocaliser) -> list[Window]:
+def strips_of(localiser: Parted) -> list[Window]:
     """Return the parts of a frame that are searched one after the other."""
     width, height = localiser.size_px
-    count = math.ceil(width * height / STRIP_PX)
+    count = math.ceil(width * height / localiser.strip_px)
     overlap = min(localiser.span_px, width)
     step = (width - overlap) / count
     return [
@@ -46,9 +79,9 @@ def strips_of(localiser: MarkLocaliser) -> list[Window]:
 
 
 class SpreadSearch:
-    """A mark localiser that remembers which strips it has searched since it lost the robot."""
+    """A localiser that remembers which strips it has searched since it lost the robot."""
 
-    def __init__(self, localiser: MarkLocaliser, strips: list[Window]) -> None:
+    def __init__(self, localiser: Parted, strips: list[Window]) -> None:
         self._localiser = localiser
         self._strips = strips
         self._next = 0
@@ -79,7 +112,7 @@ class SpreadSearch:
     def _take(self, seen: PoseMeasurement) -> None:
         """Keep a find; one where another was, in the strip beside it, takes its place."""
         if seen.pose is None:
-            if seen.reason == TWO_PLACES:
+            if seen.reason == TWO_PLACES or seen.reason.endswith(IN_VIEW):
                 self._found.append(seen)
             return
         others = [one for one in self._found if not _same(one, seen)]

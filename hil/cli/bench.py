@@ -80,13 +80,13 @@ def _measure_vision(frames: int, without: int, page: Path | None, as_json: bool)
     from dataclasses import asdict
 
     from hil.core.files import replace_file
-    from hil.tools import bench_peers, bench_vision
+    from hil.tools import bench_peers, bench_vision, look_alikes
 
     def progress(text: str) -> None:
         click.echo(text, err=True)
 
     rows = bench_vision.table(100, progress)
-    empty = bench_vision.empty_scenes(without, progress)
+    empty = look_alikes.empty_scenes(without, tuple(bench_vision.VIEWS.values()), progress)
     shown = list(bench_peers.lines(frames, progress))
     peers = [line for lines, _ in shown for line in lines]
     if page is not None:

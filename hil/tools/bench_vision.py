@@ -12,7 +12,6 @@ import statistics
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
-from random import Random
 from typing import Any, Literal
 
 import cv2
@@ -23,12 +22,11 @@ from hil.config.camera import (
     CameraPoseConfig,
     ClutterConfig,
     GlareConfig,
-    MarksConfig,
-    RobotLookConfig,
     SceneConfig,
     ShadowEdgeConfig,
 )
 from hil.core.types import Pose, PoseMeasurement, wrap_pi
+from hil.tools.look_alikes import GREEN, RED, Empty
 from sim_twin.camera_sim import RenderedCamera
 from vision.camera_setup import camera_model
 from vision.localisers.marks import MarkLocaliser
@@ -47,9 +45,7 @@ HALF_AXES_M = (0.60, 0.30)
 GROSS_M, GROSS_RAD = 0.02, math.radians(5.0)
 POSES_PER_EXPOSURE = 9
 ACQUIRE_EVERY = 5
-EMPTY_FRAMES_PER_SCENE = 50
 
-RED, GREEN = (0.07, 0.06, 0.62), (0.12, 0.42, 0.08)
 _RED_DISC = ClutterConfig(x_m=0.25, y_m=0.05, colour=RED)
 _SHADOW = ShadowEdgeConfig(through_m=(0.1, 0.0), azimuth_rad=1.2, depth_ratio=0.5)
 _GLARE = GlareConfig(x_m=0.35, y_m=0.22, radius_m=0.08, peak_dn=120.0)
@@ -98,15 +94,6 @@ class Row:
     tracking_ms: float
     acquired_ratio: float
     acquisition_ms: float
-
-
-@dataclass(frozen=True, slots=True)
-class Empty:
-    """Scenes without the robot: how many frames, and in how many it was seen all the same."""
-
-    scenes: int
-    frames: int
-    accepted: int
 
 
 def camera_in(view: View, size_px: tuple[int, int], condition: str) -> CameraConfig:
@@ -185,70 +172,6 @@ def _rms(values: list[float]) -> float:
     return math.sqrt(sum(v * v for v in values) / len(values)) if values else math.nan
 
 
-def clutter(rng: Random) -> tuple[ClutterConfig, ...]:
-    """Return a dozen things of the marks' colours and of others: discs, boxes, dark sheets.
-
-    Some discs have the marks' own size, and some lie on a dark sheet as marks do; a plate carries two
-    marks at the wrong distance. Only two of both colours, at the robot's own distance on dark ground,
-    would be the robot's equal.
-    """
-    things = list(_nearly_a_robot(rng))
-    for _ in range(12):
-        colour = rng.choice((RED, GREEN, RED, GREEN, (0.5, 0.2, 0.05), (0.08, 0.5, 0.55)))
-        size_m = rng.choice((0.06, rng.uniform(0.02, 0.2)))
-        x_m, y_m = rng.uniform(-0.9, 0.9), rng.uniform(-0.6, 0.6)
-        place = {"x_m": x_m, "y_m": y_m, "theta_rad": rng.uniform(0.0, 3.0)}
-        if rng.random() < 0.3:
-            sheet = (size_m + rng.uniform(0.03, 0.1), size_m + rng.uniform(0.03, 0.1))
-            things.append(ClutterConfig(
-                shape="box", size_m=sheet, height_m=1e-4, colour=(0.05, 0.05, 0.05), **place
-            ))  # fmt: skip
-        shape: Literal["disc", "box"] = rng.choice(("disc", "disc", "box"))
-        size = (size_m, size_m if shape == "disc" else rng.uniform(0.02, 0.2))
-        height_m = rng.choice((0.001, 0.001, 0.1, rng.uniform(0.0, 0.2)))
-        things.append(
-            ClutterConfig(shape=shape, size_m=size, height_m=height_m, colour=colour, **place)
-        )
-    return tuple(things)
-
-
-def _nearly_a_robot(rng: Random) -> Iterator[ClutterConfig]:
-    """Yield a plate with two marks 10 to 40 % too near to or too far from one another."""
-    marks = MarksConfig()
-    x_m, y_m, theta_rad = rng.uniform(-0.6, 0.6), rng.uniform(-0.4, 0.4), rng.uniform(-3.0, 3.0)
-    ratio = 1.0 + rng.choice((-1.0, 1.0)) * rng.uniform(0.1, 0.4)
-    yield ClutterConfig(
-        shape="box", x_m=x_m, y_m=y_m, theta_rad=theta_rad, size_m=(0.32, 0.16),
-        height_m=marks.height_m - 0.001, colour=(0.05, 0.05, 0.05),
-    )  # fmt: skip
-    for mark in (marks.front, marks.rear):
-        yield ClutterConfig(
-            x_m=x_m + ratio * mark.x_m * math.cos(theta_rad),
-            y_m=y_m + ratio * mark.x_m * math.sin(theta_rad),
-            size_m=(marks.diameter_m,) * 2, height_m=marks.height_m, colour=mark.colour,
-        )  # fmt: skip
-
-
-def empty_scenes(frames: int, progress: Progress | None = None) -> Empty:
-    """Return how often a robot is seen where there is none, in scenes full of coloured things."""
-    rng = Random(20)
-    scenes = math.ceil(frames / EMPTY_FRAMES_PER_SCENE)
-    accepted = done = 0
-    for scene in range(scenes):
-        if progress is not None:
-            progress(f"empty scene {scene + 1} of {scenes}")
-        pose = VIEWS["oblique" if scene % 2 else "ceiling"]
-        look = SceneConfig(clutter=clutter(rng), read_noise_dn=3.0, full_well_e=3000.0)
-        camera = CameraConfig(pose=pose, scene=look, robot_look=RobotLookConfig())
-        rendered = RenderedCamera(camera, seed=scene)
-        localiser = MarkLocaliser(camera_model(camera), camera.marks)
-        for index in range(min(EMPTY_FRAMES_PER_SCENE, frames - done)):
-            seen = localiser.locate(rendered.make(index, ()), None, 0.0)
-            accepted += seen.pose is not None
-            done += 1
-    return Empty(scenes, done, accepted)
-
-
 def table(frames: int, progress: Progress | None = None) -> list[Row]:
     """Return every line of the table."""
     cv2.setNumThreads(1)
@@ -277,7 +200,8 @@ def as_markdown(rows: list[Row], empty: Empty) -> str:
     ]
     lines.append(
         f"\nWithout the robot: {empty.accepted} of {empty.frames} frames accepted, in"
-        f" {empty.scenes} scenes of coloured things."
+        f" {empty.scenes} scenes of coloured things and look-alikes; beside them the robot was found in"
+        f" {empty.found} of {empty.with_robot}, wrongly in {empty.wrong}."
     )
     return "\n".join(lines)
 

@@ -18,7 +18,6 @@ from hil.tools import vision_conditions as bench
 from tests.vision.scenes import errors
 from vision.camera import CameraModel
 from vision.camera_setup import camera_model
-from vision.disc_fit import RimFitter
 from vision.localisers.marks import MarkLocaliser
 
 RENDERS = Path(__file__).parent.parent / "data" / "renders"
@@ -81,20 +80,22 @@ def test_a_prediction_leaves_nothing_of_its_error_in_the_answer(condition):
     assert np.mean(np.square(tracked)) < 1.1 * np.mean(np.square(acquired))
 
 
-@pytest.mark.parametrize("condition", ["clean", "severe", "extreme"])
+@pytest.mark.parametrize(
+    "condition", ["clean", "severe", "extreme", "defocus", "gradient", "jpeg", "covered"]
+)
 def test_the_claimed_covariance_is_true(condition):
-    """Mean NEES of x, y, theta between 0.7 and 6 over 8 frames: chi2 of 24 has 1.6 to 4.9 at 95 %.
+    """Mean NEES of x, y, theta between 1.2 and 5.4 over 8 frames: chi2 of 24 has that at 99 %.
 
-    A clean frame may claim too much: what no residual shows is taken at its largest.
+    Twenty of JPEG, where few patches make the noise and a claim is known to a factor.
     """
-    finder, frames = shown("ceiling", condition, 8)
+    finder, frames = shown("ceiling", condition, 20 if condition == "jpeg" else 8)
     values = [
         nees(seen, frame.truth)
         for frame in frames
         if (seen := finder.locate(frame.image, frame.prediction, 0.06)).pose is not None
     ]
     assert len(values) >= len(frames) - 1
-    assert (0.2 if condition == "clean" else 0.7) < float(np.mean(values)) < 6.0
+    assert 1.2 < float(np.mean(values)) < 5.4
 
 
 def test_blur_makes_the_claim_long_along_the_motion():
@@ -168,25 +169,6 @@ def described(truth, frame):
         diameter_m=truth["mark_diameter_m"], height_m=truth["mark_height_m"],
     )  # fmt: skip
     return model, marks
-
-
-@pytest.mark.parametrize(("truth", "frame"), drawn_elsewhere())
-def test_discs_are_those_of_the_same_fit_in_numpy(truth, frame):
-    """Places to 1e-4 px and all figures to 1e-4, against an implementation in numpy, kept as numbers."""
-    model, marks = described(truth, frame)
-    weights = np.array([m.colour for m in (marks.front, marks.rear)])
-    weights -= weights.mean(axis=1, keepdims=True)
-    weights /= np.linalg.norm(weights, axis=1, keepdims=True)
-    fitter = RimFitter(model, 0.5 * marks.diameter_m, marks.height_m, weights)
-    c, s = math.cos(frame["theta_rad"]), math.sin(frame["theta_rad"])
-    centres = [
-        (frame["x_m"] + c * m.x_m, frame["y_m"] + s * m.x_m) for m in (marks.front, marks.rear)
-    ]
-    discs = fitter.fit(cv2.imread(str(RENDERS / frame["file"])), centres)
-    kept = json.loads((RENDERS / "discs.json").read_text())[frame["file"]]
-    for disc, numbers in zip(discs, kept, strict=True):
-        for name, value in numbers.items():
-            assert getattr(disc, name) == pytest.approx(value, abs=1e-4, rel=1e-5), name
 
 
 @pytest.mark.parametrize(("truth", "frame"), drawn_elsewhere())

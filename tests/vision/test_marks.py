@@ -8,7 +8,7 @@ import pytest
 
 from hil.config.camera import BarConfig, ClutterConfig, MarksConfig, SceneConfig
 from hil.core.types import Pose
-from hil.tools import bench_vision
+from hil.tools import bench_vision, look_alikes
 from tests.vision.scenes import (
     DEFAULT,
     at_rest,
@@ -97,9 +97,7 @@ def test_nothing_is_seen_where_no_robot_is():
     rng = Random(7)
     reasons = set()
     for scene in range(4):
-        camera = DEFAULT.model_copy(
-            update={"scene": SceneConfig(clutter=bench_vision.clutter(rng))}
-        )
+        camera = DEFAULT.model_copy(update={"scene": SceneConfig(clutter=look_alikes.clutter(rng))})
         frame = bench_vision.RenderedCamera(camera, scene).make(0, ())
         seen = localiser(camera).locate(frame, None, 0.06)
         assert seen.pose is None

@@ -6,10 +6,13 @@ from itertools import pairwise
 
 import pytest
 
-from hil.config.camera import CameraConfig, ClutterConfig
+from hil.config.camera import CameraConfig, ClutterConfig, MarkConfig, TagConfig
 from hil.core.types import Pose
 from hil.tools import vision_conditions as bench
 from tests.vision.scenes import DEFAULT, errors, localiser, rendered
+from vision.camera_setup import camera_model
+from vision.localisers.tags import TagLocaliser
+from vision.many_marks import ManyMarks
 from vision.spread import SpreadSearch, spread, strips_of
 
 HD = (1280, 720)
@@ -121,3 +124,36 @@ def test_ours_is_the_one_near_the_prediction():
     finder = localiser(with_which(camera, (0.7, 0.0)))
     seen = finder.locate(image, Pose(-0.3, 0.1, 0.3), 0.06)
     assert math.dist((seen.pose.x_m, seen.pose.y_m), (-0.5, 0.1)) < 2e-3
+
+
+def made(kind):
+    """Return a localiser of three marks or of a tag, its camera, and pictures of places in 720p."""
+    blue = MarkConfig(colour=bench.BLUE, x_m=0.0, y_m=-0.07)
+    marks = CameraConfig().marks
+    if kind == "three marks":
+        camera = bench.camera_of("ceiling", HD, STILL, marks.model_copy(update={"more": (blue,)}))
+        finder = ManyMarks(camera)
+    else:
+        tag = TagConfig()
+        camera = bench.camera_of("ceiling", HD, STILL, tag=tag)
+        finder = TagLocaliser(camera_model(camera), tag, camera.marks.height_m)
+    return finder, camera, lambda x_m: rendered(camera).make(0, [(x_m, 0.1, 0.3)] * 2)
+
+
+@pytest.mark.parametrize("kind", ["three marks", "tag"])
+def test_other_localisers_search_a_large_frame_in_parts_too(kind):
+    """Found when all parts were searched and not before; each part is small; then followed at once."""
+    finder, camera, shown = made(kind)
+    parted = spread(finder)
+    assert isinstance(parted, SpreadSearch)
+    strips = strips_of(finder)
+    assert len(strips) > 3
+    assert max((right - left) * HD[1] for left, _, right, _ in strips) < 0.3 * HD[0] * HD[1]
+    told = [parted.locate(shown(0.45), None, camera.search_radius_m) for _ in strips]
+    assert all(seen.pose is None and "parts of the frame" in seen.reason for seen in told[:-1])
+    assert told[-1].pose is not None, told[-1].reason
+    assert math.hypot(*errors(told[-1].pose, Pose(0.45, 0.1, 0.3))[:2]) < 1e-3
+    again = parted.locate(shown(0.46), told[-1].pose, camera.search_radius_m)
+    assert again.pose is not None
+    # Negative control: with the robot away no part finds anything.
+    assert all(parted.locate(shown(9.0), None, 0.06).pose is None for _ in strips)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from hil.config.camera import MarkConfig, MarksConfig
 from hil.core.types import Pose, PoseMeasurement
-from vision.camera import CameraModel
+from vision.camera import CameraModel, longest_px
 from vision.disc_fit import Disc, Marks, RimFitter
 from vision.mark_search import CHROMA_BASIS, Centres, MarkSearch, Point, Window
 from vision.pose_fit import weighted_pose
@@ -36,6 +36,7 @@ GROWTH_DOUBT = 0.5  # more where the rim is rough: noise, blur longer than the p
 RESIDUAL_MAX = 0.09  # of the radius
 RESIDUAL_FREE_PX = 0.25  # sensor noise
 DISTANCE_TOLERANCE = 0.04
+SQUARE_MAX = 0.6  # of both marks: squares of the same width have 0.66 to 0.9, discs to 0.55
 
 # How many degrees of freedom the discs' own claims are worth against that of their distance.
 MISFIT_FREEDOM = 4.0
@@ -43,7 +44,7 @@ QUALITY_RESIDUAL = 0.06  # of the radius
 # What is hardly within each limit is no robot: the least of extreme blur and noise has 0.17.
 QUALITY_MIN = 0.12
 SAME_PLACE_M = 0.02
-_UPPER = np.triu_indices(3)
+STRIP_PX = 320_000  # those of 640 x 480, which take some 3 ms
 TWO_PLACES = "two places look like the robot"
 
 
@@ -127,16 +128,14 @@ class MarkLocaliser:
         return self._model.width_px, self._model.height_px
 
     @property
+    def strip_px(self) -> int:
+        """How many pixels are searched in one frame where the search is spread over several."""
+        return STRIP_PX
+
+    @property
     def span_px(self) -> int:
         """How long the robot's marks and their rims are together in the image, at most."""
-        width, height = self.size_px
-        spans = [0.0]
-        for u in (0.0, 0.5 * width, float(width)):
-            for v in (0.0, 0.5 * height, float(height)):
-                slope = self._model.floor_jacobian(u, v, self._height_m)
-                if np.isfinite(slope).all():
-                    spans.append(1.0 / float(np.linalg.norm(slope, -2)))
-        return math.ceil(max(spans) * (self._distance_m + 4.0 * self._radius_m))
+        return longest_px(self._model, self._height_m, self._distance_m + 4.0 * self._radius_m)
 
     def _place(self, predicted: Pose | None) -> Point | None:
         """Return where our robot is expected among several alike; None where nobody said."""
@@ -214,6 +213,8 @@ class MarkLocaliser:
             why = self._refusal(disc)
             if why:
                 return None, f"{name} mark: {why}"
+        if min(disc.square for disc in discs) > SQUARE_MAX:
+            return None, "both marks have four corners"
         at = self._model.floor_point
         front, rear = (at(disc.u_px, disc.v_px, self._height_m) for disc in discs)
         gap_m = math.dist(front, rear) - self._distance_m

@@ -21,7 +21,7 @@ from hil.core.registries import LOCALISERS
 from hil.core.types import Pose, PoseMeasurement, wrap_pi
 from hil.core.wording import past
 from vision import cv_compat
-from vision.camera import CameraModel
+from vision.camera import CameraModel, longest_px
 from vision.camera_setup import camera_model
 from vision.pose_fit import fit_pose
 
@@ -33,6 +33,7 @@ CORNERS = np.array([[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]])
 NORMALS = np.array([[0.0, 1.0], [1.0, 0.0], [0.0, -1.0], [-1.0, 0.0]])
 ALONG = np.array([[1.0, 0.0], [0.0, -1.0], [-1.0, 0.0], [0.0, 1.0]])
 SIDE_READABLE_PX = 50.0
+STRIP_PX = 80_000  # searched in some 5 ms, twice that where the picture is enlarged
 SAMPLES_PER_SIDE = 24
 # Profiles across a side stay within the black border, one cell of six wide, and the white margin.
 PROFILE_SHARE = 0.6
@@ -47,6 +48,7 @@ SIGMA_MIN_PX = 0.02
 SIGMA_HEIGHT_M = 0.002
 QUALITY_RESIDUAL_PX = 0.3
 QUALITY_CONTRAST_DN = 80.0
+IN_VIEW = "in view"  # how the reason ends where there are too many
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,14 +81,53 @@ class TagLocaliser:
         With a prediction the search stays in a window of `search_radius_m` around it, and falls
         back to the whole frame when the tag is not there.
         """
+        seen = None if predicted is None else self.near(image_bgr, predicted, search_radius_m)
+        if seen is not None:
+            return seen
+        return self.inside(image_bgr, (0, 0, image_bgr.shape[1], image_bgr.shape[0]))
+
+    def near(
+        self, image_bgr: Image, predicted: Pose, search_radius_m: float
+    ) -> PoseMeasurement | None:
+        """Return the pose within `search_radius_m` of a prediction, None if not there."""
         height, width = image_bgr.shape[:2]
-        if predicted is not None:
-            window = self._window((width, height), predicted, search_radius_m)
-            if window is not None:
-                found = self._search(image_bgr, window, predicted, search_radius_m)
-                if found.pose is not None:
-                    return found
-        return self._search(image_bgr, (0, 0, width, height), None, 0.0)
+        window = self._window((width, height), predicted, search_radius_m)
+        if window is None:
+            return None
+        found = self._search(image_bgr, window, predicted, search_radius_m)
+        return None if found.pose is None else found
+
+    def inside(
+        self, image_bgr: Image, window: Window, predicted: Pose | None = None
+    ) -> PoseMeasurement:
+        """Return the pose seen in a part of the image; one tag has one place, whatever is expected."""
+        del predicted
+        return self._search(image_bgr, window, None, 0.0)
+
+    def ours(self, finds: list[PoseMeasurement], predicted: Pose | None) -> PoseMeasurement | None:
+        """Return the only find; None for none, "not seen" for several: no two tags have a number."""
+        del predicted
+        if len(finds) < 2:
+            return finds[0] if finds else None
+        return _not_seen(
+            f"{len(finds)} tags with number {self._tag.tag_id} {IN_VIEW}", {"window": 0.0}
+        )
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of the frames."""
+        return self._camera.width_px, self._camera.height_px
+
+    @property
+    def span_px(self) -> int:
+        """How long the tag and its margin are in the image, at most: across its corners."""
+        side_m = self._tag.size_m * (1.0 + 2.0 * self._tag.margin_ratio)
+        return longest_px(self._camera, self._height_m, math.sqrt(2.0) * side_m)
+
+    @property
+    def strip_px(self) -> int:
+        """How many pixels are searched in one frame where the search is spread over several."""
+        return STRIP_PX
 
     def _search(
         self, image: Image, window: Window, predicted: Pose | None, radius_m: float
@@ -101,7 +142,7 @@ class TagLocaliser:
         outlines = [self._outline(level, (u0, v0), four) for four in ours]
         good = [o for o in outlines if o is not None and self._reason(o) == ""]
         if len(good) > 1 and predicted is None:
-            return _not_seen(f"{len(good)} tags with number {self._tag.tag_id} in view", details)
+            return _not_seen(f"{len(good)} tags with number {self._tag.tag_id} {IN_VIEW}", details)
         if not good:
             whole = [o for o in outlines if o is not None]
             return _not_seen(self._reason(whole[0]) if whole else "outline hidden", details)

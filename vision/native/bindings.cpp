@@ -78,7 +78,8 @@ void bind_rims(nb::module_& m) {
       .def_ro("residual_px", &Disc::residual_px)
       .def_ro("covariance_px2", &Disc::covariance_px2)
       .def_ro("contrast_dn", &Disc::contrast_dn)
-      .def_ro("ground_ratio", &Disc::ground_ratio);
+      .def_ro("ground_ratio", &Disc::ground_ratio)
+      .def_ro("square", &Disc::square);
   nb::class_<RimFitter>(m, "RimFitter")
       .def(
           "__init__",

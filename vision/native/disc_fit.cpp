@@ -25,16 +25,10 @@ constexpr double kOutlierSigmas = 3.0;
 // Of five rays side by side, more of which must have an edge for that in the middle.
 constexpr int kBesideMin = 3;
 constexpr double kEdgeSigmaMinPx = 0.05;
+constexpr double kOffMax = 0.4;  // of the radius: a square's corners
 // Doubt of the radius before the fit, relative, as a pull towards the known one.
 constexpr double kRadiusSigma = 0.02;
 constexpr double kRadiusPull = (0.15 / kRadiusSigma) * (0.15 / kRadiusSigma);
-// How much more noise there is in one turn of the rim than in two to four of them; the more so, the
-// more of it is shared by neighbouring rays; that which varies twice may be blur.
-constexpr double kNoiseRatio = 1.3;
-constexpr double kNoiseSlope = 0.4;
-// What no residual shows: lens model, interpolation, light within a profile.
-constexpr double kFreeRatio = 0.0008;  // of the radius
-constexpr double kFreePx = 0.004;
 
 int count(const Mask& keep) { return static_cast<int>(std::count(keep.begin(), keep.end(), true)); }
 
@@ -125,56 +119,16 @@ std::optional<Move> robust(const std::array<Move, kRays>& rows, const Round& shi
   return solved(rows, shift, keep);
 }
 
-// Cosines and sines of two to four turns of the rim.
-using Waves = std::array<std::array<double, kRays>, 6>;
-const Waves& waves() {
-  static const Waves kept = [] {
-    Waves all;
-    for (int turns = 2; turns <= 4; ++turns) {
-      for (int ray = 0; ray < kRays; ++ray) {
-        all[turns - 2][ray] = std::cos(kTurn * ray / kRays * turns);
-        all[turns + 1][ray] = std::sin(kTurn * ray / kRays * turns);
-      }
+// Where a change of every ray's edge, in samples, moves the centre.
+Vec2 moved(const Matrix& covariance, const std::array<Move, kRays>& rows, const Round& scale, const Mask& keep,
+           const Round& change) {
+  Move right = {};
+  for (int ray = 0; ray < kRays; ++ray) {
+    for (int i = 0; keep[ray] && i < 3; ++i) {
+      right[i] += rows[ray][i] * scale[ray] * change[ray];
     }
-    return all;
-  }();
-  return kept;
-}
-
-// The variance that the residuals show to move the centre.
-//
-// That noise varies once round the rim; the fit has taken it up. What is left has that which varies
-// two to four times, noise of nearly the same kind: pixels and blocks shared by neighbouring rays,
-// light, cover.
-double noise_of(const Round& rest, int kept) {
-  double slow = 0.0;
-  double shared = 0.0;
-  for (int i = 0; i < 6; ++i) {
-    double sum = 0.0;
-    for (int ray = 0; ray < kRays; ++ray) {
-      sum += rest[ray] * waves()[i][ray];
-    }
-    const double power = sum * sum * (2.0 / kept);
-    slow += power / 6.0;
-    shared += i % 3 == 0 ? 0.0 : power / 4.0;
   }
-  double squares = 0.0;
-  for (const double r : rest) {
-    squares += r * r;
-  }
-  const double fast = squares / std::max(kept - 3, 1);
-  const double ratio = std::max(shared / std::max(fast, 1e-12), 1.0);
-  return kNoiseRatio * std::max(slow, fast) * std::pow(ratio, kNoiseSlope);
-}
-
-// Turn the covariance for a noise of 1 px into that for what was seen.
-void claim(Disc& disc, double variance) {
-  const double ratio = kFreeRatio * disc.radius_px;
-  const double free = ratio * ratio + kFreePx * kFreePx;
-  auto& [uu, uv, vv] = disc.covariance_px2;
-  uu = uu * variance + free;
-  uv = uv * variance;
-  vv = vv * variance + free;
+  return {dot3(covariance[0], right), dot3(covariance[1], right)};
 }
 
 }  // namespace
@@ -304,7 +258,8 @@ bool RimFitter::step(const Picture& picture, Vec2 px, const Colour& weights, con
     const Vec2 n = rim->normals[ray];
     const double pull = done.edges.gain[ray] * weight;
     done.rows[ray] = {n.x * pull, n.y * pull, dot(n, rim->arms[ray]) * pull};
-    done.shift[ray] = done.edges.shift[ray] * rim->step_px * weight;
+    done.scale[ray] = rim->step_px * weight;
+    done.shift[ray] = done.edges.shift[ray] * done.scale[ray];
   }
   done.keep = whole;
   for (int ray = 0; keep != nullptr && ray < kRays; ++ray) {
@@ -317,11 +272,13 @@ bool RimFitter::step(const Picture& picture, Vec2 px, const Colour& weights, con
   return move.has_value();
 }
 
-Disc RimFitter::disc(const Picture& picture, const Step& step, double& variance) const {
+Disc RimFitter::disc(const Picture& picture, const Step& step, Evidence& evidence) const {
   const auto& [du, dv, growth] = step.move;
   Round rest = {};
+  Round off;
   std::vector<float> ratios;
   double squares = 0.0;
+  double gain = 0.0;
   const auto brightness = [&](int ray, int first) {
     float sum = 0.0F;
     for (int i = first; i < first + 2; ++i) {
@@ -333,26 +290,37 @@ Disc RimFitter::disc(const Picture& picture, const Step& step, double& variance)
     return sum;
   };
   for (int ray = 0; ray < kRays; ++ray) {
+    const double left = step.shift[ray] - dot3(step.rows[ray], step.move);
+    off[ray] = std::clamp(left, -kOffMax * step.shape.radius_px, kOffMax * step.shape.radius_px);
     if (step.keep[ray]) {
-      rest[ray] = step.shift[ray] - dot3(step.rows[ray], step.move);
+      rest[ray] = left;
       squares += rest[ray] * rest[ray];
+      gain += step.edges.gain[ray];
       ratios.push_back(brightness(ray, profiles_.ground()) /
                        std::max(brightness(ray, profiles_.own()), 1.0F));
     }
   }
   const int kept = static_cast<int>(ratios.size());
   std::nth_element(ratios.begin(), ratios.begin() + kept / 2, ratios.end());
-  variance = noise_of(rest, kept);
+  const double share = static_cast<double>(kept) / kRays;
   const Matrix centre = inverse(normal(step.rows, step.keep)).value_or(Matrix{});
+  evidence = {rim_noise(rest, kept),
+              {centre[0][0], centre[0][1], centre[1][1]},
+              moved(centre, step.rows, step.scale, step.keep, step.edges.ground),
+              moved(centre, step.rows, step.scale, step.keep, step.edges.cover),
+              step.shape.radius_px,
+              share,
+              gain / kept};
   return Disc{step.from_px.x + du,
               step.from_px.y + dv,
               step.shape.radius_px,
               growth,
-              static_cast<double>(kept) / kRays,
+              share,
               std::sqrt(squares / kept),
-              {centre[0][0], centre[0][1], centre[1][1]},
+              {},
               step.edges.typical_dn,
-              ratios[kept / 2]};
+              ratios[kept / 2],
+              squareness(off)};
 }
 
 std::optional<std::array<Disc, 2>> RimFitter::fit(const Picture& picture,
@@ -392,11 +360,10 @@ std::optional<std::array<Disc, 2>> RimFitter::fit(const Picture& picture,
     }
     all_rays = far_px > kRekeepPx;
   }
-  std::array<double, 2> variance;
-  std::array<Disc, 2> discs = {disc(picture, steps[0], variance[0]), disc(picture, steps[1], variance[1])};
-  const double shared = 0.5 * (variance[0] + variance[1]);
+  std::array<Evidence, 2> shown;
+  std::array<Disc, 2> discs = {disc(picture, steps[0], shown[0]), disc(picture, steps[1], shown[1])};
   for (int k = 0; k < 2; ++k) {
-    claim(discs[k], std::max(variance[k], 0.5 * (variance[k] + shared)));
+    discs[k].covariance_px2 = claim(shown[k], shown[1 - k]);
   }
   return discs;
 }

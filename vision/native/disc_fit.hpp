@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "camera.hpp"
+#include "claim.hpp"
 #include "picture.hpp"
 #include "rims.hpp"
 #include "symmetric.hpp"
@@ -14,11 +15,12 @@ namespace vision {
 
 // One fitted disc. (u, v) is the image of its centre, `growth` its radius over the known one less 1,
 // `share` the part of its rim that was seen, `residual_px` the RMS of those edges, the covariance
-// that of (u, v), `ground_ratio` the brightness beside it over its own.
+// that of (u, v), `ground_ratio` the brightness beside it over its own, `square` is near 1
+// for one that has four corners.
 struct Disc {
   double u_px, v_px, radius_px, growth, share, residual_px;
   std::array<double, 3> covariance_px2;  // uu, uv, vv
-  double contrast_dn, ground_ratio;
+  double contrast_dn, ground_ratio, square;
 };
 
 class RimFitter {
@@ -46,7 +48,7 @@ class RimFitter {
     Vec2 from_px;  // centre before the step
     Edges edges;
     std::array<Move, kRays> rows;
-    Round shift;
+    Round shift, scale;  // `scale`: from samples to the units of `rows`
     Mask keep;
     Move move;
   };
@@ -55,8 +57,8 @@ class RimFitter {
   std::optional<Vec2> centred(const Picture& picture, Vec2 px, const Colour& weights) const;
   bool step(const Picture& picture, Vec2 px, const Colour& weights, const Mask* keep, Step& done) const;
   Mask within(const Picture& picture, Vec2 px, const Shape& shape) const;
-  // The figures of a fitted disc, its covariance for a noise of 1 px; `variance` is the noise's.
-  Disc disc(const Picture& picture, const Step& step, double& variance) const;
+  // The figures of a fitted disc but for its covariance, and what that rests on.
+  Disc disc(const Picture& picture, const Step& step, Evidence& evidence) const;
 
   Camera camera_;
   double radius_m_, height_m_;

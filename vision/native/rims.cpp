@@ -18,6 +18,15 @@ constexpr double kStepShare = 0.3;
 constexpr double kShiftShare = 0.8;
 constexpr double kResponseMinDn = 6.0;
 constexpr double kGainMin = 0.02;
+// Ground so many deviations off that round most of the disc may be another thing, which blur has
+// brought near. Its noise is that between rays so far apart that they share no pixels.
+constexpr double kUsualSpreads = 2.0;
+constexpr int kStepRays = 3;
+constexpr double kOwnMinDn = 0.3;
+// A disc's level inside may fall by so much with light and shade before it is taken for covered.
+constexpr double kDarkFree = 0.1;
+constexpr double kLeanMax = 0.1;
+constexpr double kLeanNoise = 0.33;  // of a ray's own variance: twice that of a first turn
 
 // Means over neighbouring rays, an odd number of them.
 Round about(const Round& values, int rays) {
@@ -34,9 +43,23 @@ Round about(const Round& values, int rays) {
   return means;
 }
 
+// Cosine and sine of a ray's angle.
+const std::array<Round, 2>& turn() {
+  static const std::array<Round, 2> kept = [] {
+    std::array<Round, 2> both;
+    for (int ray = 0; ray < kRays; ++ray) {
+      both[0][ray] = std::cos(6.283185307179586 * ray / kRays);
+      both[1][ray] = std::sin(6.283185307179586 * ray / kRays);
+    }
+    return both;
+  }();
+  return kept;
+}
+
 // Level, gain and shift of the profiles of one length.
 struct Length {
-  Round rise, level, gain, shift, inner;
+  Round rise, level, gain, shift, inner, low, high, strange;
+  double usual_low, usual_high;
 };
 
 // Running sums of the profile of each ray, kRays x (samples + 1).
@@ -53,13 +76,53 @@ std::vector<double> running(const std::vector<float>& response, int samples) {
   return sums;
 }
 
+double median(Round values) {
+  std::nth_element(values.begin(), values.begin() + kRays / 2, values.end());
+  return values[kRays / 2];
+}
+
+// Noise of what each ray has of its own, from rays so far apart that they share no pixels.
+double ray_noise_dn(const Round& values) {
+  Round step;
+  for (int ray = 0; ray < kRays; ++ray) {
+    step[ray] = std::abs(values[ray] - values[(ray + kStepRays) % kRays]);
+  }
+  return 1.4826 / std::sqrt(2.0) * median(step);
+}
+
+// Levels with their first turn round the disc grown by a share `lean`: light that falls to one side does
+// so on from where the levels are taken out to the rim. One that differs by much is a shade or a cover.
+// So does one within the noise of the rays' own levels, `inner`, which would only be added to the rest.
+Round leaning(const Round& inner, double lean) {
+  const Round levels = about(inner, kLevelRays);
+  double mean = 0.0;
+  double along = 0.0;
+  double across = 0.0;
+  for (int ray = 0; ray < kRays; ++ray) {
+    mean += levels[ray] / kRays;
+    along += levels[ray] * turn()[0][ray] * (2.0 / kRays);
+    across += levels[ray] * turn()[1][ray] * (2.0 / kRays);
+  }
+  const double square = along * along + across * across;
+  const double own_dn = ray_noise_dn(inner);
+  const double sure = 1.0 - kLeanNoise * own_dn * own_dn / std::max(square, 1e-12);
+  if (lean == 0.0 || sure <= 0.0 || square > kLeanMax * kLeanMax * mean * mean) {
+    return levels;
+  }
+  Round leant;
+  for (int ray = 0; ray < kRays; ++ray) {
+    leant[ray] = levels[ray] + sure * lean * (along * turn()[0][ray] + across * turn()[1][ray]);
+  }
+  return leant;
+}
+
 struct Swing {
-  Round rise, swing, inner;
+  Round rise, swing, inner, outer, low, high;
 };
 
 // How far between its two levels the mean of each profile is: -1 all outside, 1 all inside.
 Swing swing(const std::vector<float>& response, const std::vector<double>& sums, int samples, int middle,
-            int edge, int level) {
+            int edge, int level, double lean) {
   Round inner, outer, between;
   for (int ray = 0; ray < kRays; ++ray) {
     const double* s = &sums[ray * (samples + 1)];
@@ -71,9 +134,12 @@ Swing swing(const std::vector<float>& response, const std::vector<double>& sums,
     between[ray] = (s[last + 1] - s[first] - 0.5 * (r[first] + r[last])) * (0.5 / edge);
   }
   const Round low = about(outer, kLevelRays);
-  const Round high = about(inner, kLevelRays);
+  const Round high = leaning(inner, lean);
   Swing found;
   found.inner = inner;
+  found.outer = outer;
+  found.low = low;
+  found.high = high;
   for (int ray = 0; ray < kRays; ++ray) {
     found.rise[ray] = high[ray] - low[ray];
     found.swing[ray] = 2.0 * (between[ray] - low[ray]) / std::max(found.rise[ray], 1.0) - 1.0;
@@ -92,6 +158,22 @@ void take_better_side(Round& level, Round& gain) {
   }
 }
 
+// How far the ground outside each ray is from that round most of the disc, beyond what its noise lets
+// it be, in units of the noise of one sample; `level` samples of a ray make its own ground, `outer`.
+Round strangeness(const Round& outer, const Round& low, double usual, int level) {
+  Round away;
+  for (int ray = 0; ray < kRays; ++ray) {
+    away[ray] = std::abs(low[ray] - usual);
+  }
+  const double own_dn = std::max(ray_noise_dn(outer), kOwnMinDn);
+  const double free_dn = kUsualSpreads * own_dn / std::sqrt(static_cast<double>(kLevelRays) / kStepRays);
+  const double sample_dn = own_dn * std::sqrt(static_cast<double>(level));
+  for (double& one : away) {
+    one = std::max(one - free_dn, 0.0) / sample_dn;
+  }
+  return away;
+}
+
 }  // namespace
 
 double reach_px(double radius_px) {
@@ -105,6 +187,9 @@ Profiles::Profiles(double radius_px) : half_(0) {
     edge_[k] = static_cast<int>(std::ceil(std::max(reach * radius_px, kReachMinPx)));
     level_[k] = std::max(2, static_cast<int>(std::nearbyint(level * radius_px)));
     half_ = std::max(half_, edge_[k] + level_[k] + 1);
+    // Longer ones are for blurred rims, whose levels fall to one side with the blur and not with light.
+    const double levels_at = radius_px - edge_[k] - 0.5 * level_[k];
+    lean_[k] = k == 0 && levels_at > 0.5 * radius_px ? (radius_px - 0.5 * edge_[k]) / levels_at - 1.0 : 0.0;
   }
 }
 
@@ -115,11 +200,16 @@ Edges Profiles::edges(const std::vector<float>& response) const {
   for (int k = 0; k < kLengths; ++k) {
     Length& own = lengths[k];
     const int e = edge_[k];
-    const Swing here = swing(response, sums, n, half_, e, level_[k]);
-    const Swing in = swing(response, sums, n, half_ - 1, e, level_[k]);
-    const Swing out = swing(response, sums, n, half_ + 1, e, level_[k]);
+    const Swing here = swing(response, sums, n, half_, e, level_[k], lean_[k]);
+    const Swing in = swing(response, sums, n, half_ - 1, e, level_[k], lean_[k]);
+    const Swing out = swing(response, sums, n, half_ + 1, e, level_[k], lean_[k]);
     own.rise = here.rise;
     own.inner = here.inner;
+    own.low = here.low;
+    own.high = here.high;
+    own.usual_low = median(own.low);
+    own.usual_high = median(own.high);
+    own.strange = strangeness(here.outer, own.low, own.usual_low, level_[k]);
     Round slope;
     for (int ray = 0; ray < kRays; ++ray) {
       slope[ray] = (in.swing[ray] - out.swing[ray]) * (0.5 * e);
@@ -141,7 +231,8 @@ Edges Profiles::edges(const std::vector<float>& response) const {
       const double gain = std::clamp(lengths[k].gain[ray], kGainMin, 1.0);
       // Levels are shared by neighbouring rays, which does not average them over a whole disc.
       const double scatter = 2.0 * edge_[k] * std::sqrt(0.5 / edge_[k] + 0.5 / level_[k]);
-      const double noise = scatter / lengths[k].level[ray];
+      const double moved = edge_[k] * lengths[k].strange[ray];
+      const double noise = std::hypot(scatter, moved) / lengths[k].level[ray];
       if (gain / noise > most) {
         most = gain / noise;
         best[ray] = k;
@@ -153,6 +244,10 @@ Edges Profiles::edges(const std::vector<float>& response) const {
     step[ray] = own.rise[ray];
     inner[ray] = own.inner[ray];
     found.shift[ray] = own.shift[ray];
+    const double high = own.usual_high;
+    const double dark = std::min((own.high[ray] - high) / std::max(high, 1.0) + kDarkFree, 0.0);
+    found.cover[ray] = edge_[best[ray]] * dark;
+    found.ground[ray] = edge_[best[ray]] * (own.low[ray] - own.usual_low) / own.level[ray];
   }
   Round ordered = inner;
   std::nth_element(ordered.begin(), ordered.begin() + 3 * kRays / 4, ordered.end());

@@ -22,9 +22,10 @@ using Mask = std::array<bool, kRays>;
 
 // Edges along the profiles of one disc: `shift` in samples, outwards; `gain` what a shift of the
 // disc by one sample does to it; `noise` its standard deviation for a noise of 1 DN; `typical_dn`
-// the disc's response.
+// the disc's response. `ground` and `cover` are how far the shift would move if the level outside, or
+// a level inside that is much too low, were that round most of the disc.
 struct Edges {
-  Round shift, gain, noise;
+  Round shift, gain, noise, ground, cover;
   Mask usable;
   double typical_dn;
 };
@@ -47,6 +48,7 @@ class Profiles {
 
  private:
   std::array<int, kLengths> edge_, level_;
+  std::array<double, kLengths> lean_;
   int half_;
 };
 
