@@ -149,6 +149,60 @@ def write_table(path: Path, parts: list[tuple[str, Array]]) -> Path:
     return path
 
 
+@dataclass(frozen=True)
+class WheelAnswer:
+    """The true parameters of both wheel loops, by the names that the fit uses."""
+
+    wheel_scale_left_ratio: float
+    wheel_scale_right_ratio: float
+    wheel_lag_s: float
+    wheel_dead_time_s: float
+    wheel_dead_zone_rad_s: float
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator) -> WheelAnswer:
+        """Return wheel loops drawn at random."""
+        return cls(
+            rng.uniform(0.8, 1.2), rng.uniform(0.8, 1.2), rng.uniform(0.03, 0.3),
+            rng.uniform(0.01, 0.15), rng.uniform(0.0, 1.0),
+        )  # fmt: skip
+
+
+def wheel_log(
+    path: Path, answer: WheelAnswer, seed: int, duration_s: float = 60.0, load: float = 0.02
+) -> Path:
+    """Write wheel commands at 20 Hz and wheel speeds at 50 Hz; `load` is a relative error that lasts 0.5 s."""
+    rng = np.random.default_rng(seed)
+    commands = random_commands(rng, duration_s)
+    asked = np.column_stack((
+        commands[:, 0],
+        (commands[:, 1] - 0.11 * commands[:, 2]) / 0.05,
+        (commands[:, 1] + 0.11 * commands[:, 2]) / 0.05,
+    ))  # fmt: skip
+    count = int(duration_s / STEP_S)
+    t_s = STEP_S * np.arange(count)
+    row = np.floor((t_s - answer.wheel_dead_time_s) / COMMAND_S + 1e-9).astype(int)
+    sides = []
+    for side, scale in ((1, answer.wheel_scale_left_ratio), (2, answer.wheel_scale_right_ratio)):
+        wanted = np.where(row >= 0, asked[np.clip(row, 0, None), side], 0.0)
+        zone = answer.wheel_dead_zone_rad_s
+        wanted = scale * np.copysign(np.maximum(np.abs(wanted) - zone, 0.0), wanted)
+        push = rng.normal(size=count) * load * math.sqrt(2.0 * STEP_S / 0.5)
+        speed, loss, rows = 0.0, 0.0, np.empty(count)
+        for k in range(count):
+            rows[k] = speed * (1.0 + loss)
+            speed += STEP_S * (wanted[k] - speed) / answer.wheel_lag_s
+            loss += -STEP_S * loss / 0.5 + push[k]
+        sides.append(rows[:: round(0.02 / STEP_S)])
+    at = t_s[:: round(0.02 / STEP_S)]
+    noise = rng.normal(size=(2, at.size)) * 0.05
+    return write_table(path, [
+        ("omega_cmd_left_rad_s", asked[:, [0, 1]]), ("omega_cmd_right_rad_s", asked[:, [0, 2]]),
+        ("wl", np.column_stack((at, sides[0] + noise[0]))),
+        ("wr", np.column_stack((at, sides[1] + noise[1]))),
+    ])  # fmt: skip
+
+
 def motor_log(path: Path, changes: dict[str, Any], seed: int = 1, duration_s: float = 60.0) -> Path:
     """Drive the robot's plant by steps of duty; write duty, battery, wheel speeds and poses at 50 Hz.
 
