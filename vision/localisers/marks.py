@@ -44,6 +44,7 @@ QUALITY_RESIDUAL = 0.06  # of the radius
 # What is hardly within each limit is no robot: the least of extreme blur and noise has 0.17.
 QUALITY_MIN = 0.12
 SAME_PLACE_M = 0.02
+_UPPER = np.triu_indices(3)
 STRIP_PX = 320_000  # those of 640 x 480, which take some 3 ms
 TWO_PLACES = "two places look like the robot"
 
