@@ -96,15 +96,15 @@ struct Tick {
 
 nb::tuple row_of(Watch& watch, const RowFormat& format, const wire::Link& link, const Tick& tick,
                  const Motion* estimate, const Motion* truth) {
-  std::array<double, 512> values;
-  std::size_t count = 0;
-  const auto put = [&values, &count](double value) { values[count++] = value; };
+  std::vector<double> values;
+  values.reserve(64 + format.terms.size());
+  const auto put = [&values](double value) { values.push_back(value); };
   watch.row(tick.now_s, tick.t_s, estimate, truth, nb::cast<double>(tick.goal_m[0]),
             nb::cast<double>(tick.goal_m[1]), tick.command, link, tick.late, put,
             [&](auto put_term) { format.terms.both(tick.trace, 0, format.common, put_term); });
   format.terms.both(tick.trace, format.common, format.terms.size(), put);
-  PyObject* row = PyTuple_New(static_cast<Py_ssize_t>(count));
-  for (std::size_t i = 0; i < count; ++i) {
+  PyObject* row = PyTuple_New(static_cast<Py_ssize_t>(values.size()));
+  for (std::size_t i = 0; i < values.size(); ++i) {
     PyTuple_SET_ITEM(row, static_cast<Py_ssize_t>(i), PyFloat_FromDouble(values[i]));
   }
   return nb::steal<nb::tuple>(row);
