@@ -43,7 +43,7 @@ def test_batch_says_runs_and_times_real_time_of_each_path() -> None:
     assert done.json["program"].startswith("skid-steer-hil ")
     assert done.json["machine"]["cores"] >= 1
     found = {(item["name"], item["unit"]): item for item in done.json["figures"]}
-    assert len(found) == 13  # each camera; the pose camera by native code and by Python; plant and kernel
+    assert len(found) == 13  # both ways of the pose camera, two tasks; rendered; plant and kernel
     assert ("the same, taken in by Python", "x real time") in found
     for item in found.values():
         assert len(item["values"]) == item["runs"] == 3
