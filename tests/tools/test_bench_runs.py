@@ -117,7 +117,7 @@ def test_against_a_file_of_this_command_compares_and_any_other_is_refused(tmp_pa
     file.write_text(json.dumps(hil("bench", "batch", "--runs", 2, "--json").json), encoding="utf-8")
     done = hil("bench", "batch", "--runs", 2, "--against", file, "--json")
     assert done.status == 0
-    assert len(done.json["against"]) == 9
+    assert len(done.json["against"]) == 13
     assert all(item["low"] <= item["ratio"] * 1.001 for item in done.json["against"])
     assert "now / then" in hil("bench", "batch", "--runs", 1, "--against", file).out
     other = tmp_path / "other.json"
