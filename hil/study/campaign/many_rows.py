@@ -24,6 +24,7 @@ from hil.study.campaign.maps import write_page
 from hil.study.campaign.plan import Campaign, load_campaign
 from hil.study.campaign.results import PARTS, ResultStore, early_ends, program, programs, schema_of
 
+ROWS = (10, 1_000, 100_000, 1_000_000)
 # As many rows a part as a campaign of short runs writes at a time.
 _PART_ROWS = 2000
 
