@@ -112,11 +112,12 @@ def _measure_vision(frames: int, without: int, page: Path | None, as_json: bool)
 
 
 def _measure_growth(longest_s: int, most_rows: int, plot: Path | None, as_json: bool) -> None:
-    from hil.tools import bench, bench_growth
+    from hil.study.campaign import growth
+    from hil.tools import bench
 
-    found = bench_growth.measured(longest_s, most_rows, lambda text: click.echo(text, err=True))
+    found = growth.measured(longest_s, most_rows, lambda text: click.echo(text, err=True))
     if plot is not None:
-        bench_growth.write_plot(plot, found)
+        growth.write_plot(plot, found)
     figures = [figure for series in found for figure in series.figures()]
     if as_json:
         print_json(bench.as_document("growth", figures))

@@ -51,7 +51,7 @@ def report_figures(runs: int) -> list[Figure]:
 
 
 def thinned(campaign: Campaign, runs: int = _CAMPAIGN_RUNS) -> Campaign:
-    """Return the campaign at the ends of its axes with its first seeds, so that about so many runs are left."""
+    """Return the campaign at the ends of its axes with its first seeds: about so many runs are left."""
     file = campaign.file
     first = {axis: [values[0], values[-1]] for axis, values in _lists(campaign).items()}
     combinations = 2 ** len(first) * len(file.outer) * len(file.inner)
