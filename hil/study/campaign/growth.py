@@ -7,6 +7,7 @@ they had. Workers are timed on the wall.
 from __future__ import annotations
 
 import importlib.util
+import json
 import os
 import subprocess
 import sys
@@ -28,8 +29,6 @@ from hil.study.campaign.work import run_campaign
 
 LENGTHS_S = (10, 100, 1_000, 3_600, 10_000, 36_000)
 _RUNS = (16, 32, 64)
-# The robot's own battery is empty after 3 h of driving.
-_BATTERY = "robot.battery.capacity_a_h=50"
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,20 +82,15 @@ def _of_lengths(lengths_s: list[int], say: Callable[[str], None]) -> list[Series
 
 
 def recorded_run(length_s: int) -> tuple[float, float, float]:
-    """Return processor time (s), largest memory (MB) and disk (MB) of `hil run circle`, so long."""
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "run"
-        command = [
-            sys.executable, "-m", "hil", "run", "circle", "--camera", "pose", "--out", str(out),
-            "--set", f"duration_s={length_s}", "--set", _BATTERY,
-        ]  # fmt: skip
-        child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        _, status, used = os.wait4(child.pid, 0)
-        child.returncode = os.waitstatus_to_exitcode(status)
-        if child.returncode not in {0, 1}:
-            raise RigFault(f"{' '.join(command)}: ended with status {child.returncode}")
-        size = sum(file.stat().st_size for file in out.rglob("*") if file.is_file())
-    return used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0, size * 1e-6
+    """Return processor time (s), largest memory (MB) and disk (MB) of a recorded run on the circle."""
+    command = [sys.executable, "-m", "hil.study.campaign.long_run", str(length_s)]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    if done.returncode:
+        raise RigFault(
+            f"run of {length_s} s: ended with status {done.returncode}: {done.stderr[-300:]}"
+        )
+    cpu_s, peak_mb, disk_mb = json.loads(done.stdout)
+    return cpu_s, peak_mb, disk_mb
 
 
 def _of_rows(rows: list[int], say: Callable[[str], None]) -> list[Series]:
