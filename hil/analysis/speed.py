@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import resource
 import statistics
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 
 # Name, unit, goal, and what gives one value.
 Plan = tuple[str, str, str, Callable[[], float]]
@@ -38,3 +41,15 @@ def measure(name: str, unit: str, goal: str, runs: int, once: Callable[[], float
     """Return the figure of `once`, called `runs` times after one call that is not counted."""
     once()
     return Figure.of(name, unit, [once() for _ in range(runs)], goal)
+
+
+def peak_memory_mb() -> float:
+    """Return the largest memory that this process had so far, MB.
+
+    The system's own figure for a child begins with what its parent had, so the process's is asked for first.
+    """
+    with suppress(OSError):
+        for line in Path("/proc/self/status").read_text(encoding="utf-8").splitlines():
+            if line.startswith("VmHWM:"):
+                return float(line.split()[1]) / 1024.0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0

@@ -20,7 +20,7 @@ _SPEED = ("speed", "parts", "batch", "law", "campaign", "report")
 @click.command("bench")
 @click.argument(
     "what",
-    type=click.Choice([*_SPEED, "wheels", "vision", "firmware"]),
+    type=click.Choice([*_SPEED, "growth", "wheels", "vision", "firmware"]),
     default="speed",
 )
 @click.option("--runs", type=click.IntRange(1, 100), default=5, show_default=True,
@@ -37,10 +37,16 @@ _SPEED = ("speed", "parts", "batch", "law", "campaign", "report")
               help="vision: frames of each condition that marks, tags and peers are shown.")  # fmt: skip
 @click.option("--empty", type=click.IntRange(1, 1_000_000), default=10_000, show_default=True,
               help="vision: frames without the robot, full of things like it.")  # fmt: skip
+@click.option("--longest", type=click.IntRange(10, 36_000), default=3_600, show_default=True,
+              help="growth: runs up to so many seconds.")  # fmt: skip
+@click.option("--most-rows", type=click.IntRange(10, 1_000_000), default=100_000, show_default=True,
+              help="growth: campaigns up to so many rows.")  # fmt: skip
+@click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+              help="growth: draw it there, as SVG.")  # fmt: skip
 @json_option
 def command(
     what: str, runs: int, candidates: int | None, against: Path | None, page: Path | None,
-    frames: int, empty: int, as_json: bool,
+    frames: int, empty: int, longest: int, most_rows: int, plot: Path | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Measure the speed of the harness, or compare the wheel laws of the board.
 
@@ -50,7 +56,8 @@ def command(
     batch     runs a second and times real time of one core, by camera, and of the plant alone
     law       the whole loop with an own law in Python, and with built-in ones
     campaign  runs a second of a campaign on all cores
-    report    a campaign's answers and page
+    report    a campaign's rows put together, its answers and page, from 10 to a million rows
+    growth    time and memory over the length of a run, rows, runs, workers and Dask workers
     wheels    both wheel laws at step, ramp, crawl, turn, load, friction, battery sag
     vision    the colour marks on rendered sequences with known truth, and beside cv2.aruco,
               AprilTag and a plain threshold; half an hour
@@ -64,6 +71,8 @@ def command(
         raise click.UsageError("--tune: the wheels have gains, the speed figures have none")
     if what not in _SPEED and against is not None:
         raise click.UsageError(f"--against: for {', '.join(_SPEED)}")
+    if plot is not None and (what != "growth" or not plot.absolute().parent.is_dir()):
+        raise click.UsageError(f"--plot {plot}: for growth, in a folder that exists")
     if candidates is not None:
         _tune_wheels(candidates, as_json)
     elif what == "wheels":
@@ -72,6 +81,8 @@ def command(
         _measure_vision(frames, empty, page, as_json)
     elif what == "firmware":
         _measure_firmware(as_json)
+    elif what == "growth":
+        _measure_growth(longest, most_rows, plot, as_json)
     else:
         _measure_speed(what, runs, against, as_json)
 
@@ -98,6 +109,26 @@ def _measure_vision(frames: int, without: int, page: Path | None, as_json: bool)
         return
     click.echo(bench_vision.as_markdown(rows, empty))
     click.echo("\n" + bench_peers.as_markdown(peers))
+
+
+def _measure_growth(longest_s: int, most_rows: int, plot: Path | None, as_json: bool) -> None:
+    from hil.study.campaign import growth
+    from hil.tools import bench
+
+    found = growth.measured(longest_s, most_rows, lambda text: click.echo(text, err=True))
+    if plot is not None:
+        growth.write_plot(plot, found)
+    figures = [figure for series in found for figure in series.figures()]
+    if as_json:
+        print_json(bench.as_document("growth", figures))
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("what", "value", "unit")
+    for figure in figures:
+        table.add_row(figure.name, f"{figure.median:.4g}", figure.unit)
+    Console().print(table)
 
 
 def _measure_firmware(as_json: bool) -> None:

@@ -79,9 +79,9 @@ struct Robot {
 };
 
 struct Scene {
-  Shared<float> texture;  // floor reflectance factor, periodic, by rows
-  int texture_size = 0;        // px per side
-  float texture_step = 0;      // m per px
+  Shared<float> texture;   // floor reflectance factor, periodic, by rows
+  int texture_size = 0;    // px per side
+  float texture_step = 0;  // m per px
   Colour floor{};
   std::vector<Block> blocks;
   std::vector<Bar> bars;

@@ -14,6 +14,7 @@ from hil.cli.sweep import program_lines
 from hil.core.errors import BadInput, RigFault
 from hil.core.figures import METRICS
 from hil.runs.execute import RunSpec, execute
+from hil.study.campaign import growth, many_rows, merge
 from hil.study.campaign.cluster import on_dask
 from hil.study.campaign.findings import documents, outcomes_of, sentences
 from hil.study.campaign.maps import write_page
@@ -214,3 +215,73 @@ def test_share_of_runs_that_hold_counts_those_without_figures(tmp_path: Path) ->
     assert outcomes.level("holds", 0, broken)[0] == 0.0
     assert np.isnan(outcomes.figures["iae_m_s"][broken]).all()
     assert any("met every requirement" in line for line in sentences(outcomes))
+
+
+def test_results_of_one_group_have_the_bytes_of_one_table(finished: Path, tmp_path: Path) -> None:
+    """Rows put together from parts are, byte for byte, the whole table written at once."""
+    path = finished / "results.parquet"
+    table = pq.read_table(path)
+    pq.write_table(table, tmp_path / "one", compression="zstd", write_page_checksum=True)
+    assert (tmp_path / "one").read_bytes() == path.read_bytes()
+
+
+def test_many_rows_are_put_together_in_groups(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rows that came in any order, some twice or to be run again, stand once each and in order."""
+    campaign = many_rows.campaign_of(2000)
+    monkeypatch.setattr(merge, "GROUP_ROWS", 300)
+    store = ResultStore(tmp_path / "s", campaign)
+    many_rows.write_parts(tmp_path / "s", campaign)
+    whole = pq.read_table(tmp_path / "s" / "parts")
+    (part,) = (tmp_path / "s" / "parts").iterdir()
+    part.unlink()
+    order = np.random.default_rng(2).permutation(whole.num_rows)
+    failed = whole.take(order[:50]).to_pylist()
+    for row in failed:
+        store.add(row | {"outcome": "error", "detail": "first try"})
+    store.flush()
+    for k in range(0, len(order), 190):
+        for row in whole.take(np.concatenate((order[k : k + 190], order[:5]))).to_pylist():
+            store.add(row)
+        store.flush()
+    results = store.finish()
+    read = pq.ParquetFile(results.path)
+    sizes = [read.metadata.row_group(k).num_rows for k in range(read.num_row_groups)]
+    assert sizes == [300] * 6 + [200]
+    assert read.read().to_pylist() == whole.sort_by("index").to_pylist()
+    assert ResultStore(tmp_path / "s", campaign).done.all()
+    assert results.column("index").to_pylist() == list(range(2000))
+
+
+def test_jobs_are_made_when_asked_for(campaign: Campaign) -> None:
+    """The same in any way of asking, numbered in order, laws of one seed beside each other."""
+    jobs = campaign.jobs()
+    assert [jobs[k] for k in range(len(jobs))] == list(jobs) == jobs[:]
+    assert [job.index for job in jobs] == list(range(16))
+    assert jobs[-1] == jobs[15]
+    assert [job.outer for job in jobs[:4]] == ["pid", "asg-ism"] * 2
+    with pytest.raises(IndexError):
+        jobs[16]
+
+
+def test_growth_is_told_by_its_slope() -> None:
+    """Of points on a line: its slope and its unit; of one point no slope."""
+    line = growth.Series("run", "s of run", "MB", (10.0, 110.0, 210.0), (1.0, 3.0, 5.0))
+    *points, slope = line.figures()
+    assert [figure.median for figure in points] == [1.0, 3.0, 5.0]
+    assert (slope.unit, slope.median) == ("MB per s of run", pytest.approx(0.02))
+    assert len(growth.Series("run", "s of run", "MB", (10.0,), (1.0,)).figures()) == 1
+
+
+def test_growth_is_drawn(tmp_path: Path) -> None:
+    """Every series has its line in a picture that is the same for the same values."""
+    found = [
+        growth.Series(what, over, "s", (1.0, 2.0), (3.0, 6.0))
+        for what, over in (("a run", "s of run"), ("rows together", "rows"), ("rate", "workers"))
+    ]
+    growth.write_plot(tmp_path / "a.svg", found)
+    growth.write_plot(tmp_path / "b.svg", found)
+    text = (tmp_path / "a.svg").read_text(encoding="utf-8")
+    assert all(series.what in text for series in found)
+    assert text == (tmp_path / "b.svg").read_text(encoding="utf-8")

@@ -64,7 +64,7 @@ def test_the_simulated_time_of_a_run_is_that_of_its_rig() -> None:
 
 def test_the_campaign_is_the_built_in_one_with_fewer_runs() -> None:
     """Both ends of every axis and every law are in it."""
-    campaign = speed._thinned(speed.load_campaign("limits"))
+    campaign = speed.thinned(speed.load_campaign("limits"))
     jobs = campaign.jobs()
     assert 16 <= len(jobs) <= 2 * speed._CAMPAIGN_RUNS
     for axis, ends in campaign.file.grid.items():
@@ -75,7 +75,7 @@ def test_the_campaign_is_the_built_in_one_with_fewer_runs() -> None:
 
 def test_a_campaign_is_timed_with_its_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two runs of one second on real workers: a rate, and the share of the workers' time."""
-    monkeypatch.setattr(speed, "_thinned", _two_runs)
+    monkeypatch.setattr(speed, "thinned", _two_runs)
     done = hil("bench", "campaign", "--runs", 1, "--json")
     rate, share = done.json["figures"]
     assert (rate["name"], rate["unit"]) == ("campaign of 2 runs", "runs/s")

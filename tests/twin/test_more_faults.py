@@ -13,6 +13,7 @@ from hil.config.camera import CameraConfig
 from hil.config.events import OF_PICTURES, Fault
 from hil.config.link import LinkConfig
 from hil.core.errors import BadInput
+from hil.core.rig import whole
 from hil.core.types import Pose
 from sim_twin.camera_faults import FaultyMaker, covered_front
 from sim_twin.camera_sim import RenderedCamera
@@ -104,7 +105,7 @@ def picture(fault: Fault, t_s: float) -> tuple[np.ndarray, np.ndarray]:
     maker = RenderedCamera(CAMERA, 1)
     faulty = FaultyMaker(maker, (fault,), lambda: RenderedCamera(covered_front(CAMERA), 1))
     faulty.begin(lambda f: (f.start_s, math.inf if f.end_s is None else f.end_s))
-    return maker.make(7, POSES), faulty.make(t_s, 7, POSES)
+    return maker.make(7, POSES), whole(faulty.make(t_s, 7, POSES))
 
 
 @pytest.mark.parametrize("kind", OF_PICTURES)

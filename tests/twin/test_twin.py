@@ -37,6 +37,8 @@ class Sketches:
         self.asked.append((index, list(poses)))
         return np.zeros((2, 2, 3), np.uint8)
 
+    draw = make
+
 
 # -- clock and arrivals ------------------------------------------------------------------------
 

@@ -16,7 +16,7 @@ constexpr int kCentroids = 2;
 constexpr double kCentredPx = 1.0;  // after a move shorter than that one is enough
 constexpr int kPolarRays = 16;
 constexpr std::array<double, 6> kPolarRadii = {0.3, 0.6, 0.85, 1.05, 1.25, 1.5};
-constexpr double kGuessPx = 3.0;  // by which a guess is mostly off at most
+constexpr double kGuessPx = 3.0;        // by which a guess is mostly off at most
 constexpr double kCentroidLevel = 0.4;  // of the way from the surroundings to the highest response
 // A step this short ends the fit; after one longer than that all rays count again.
 constexpr double kSettledPx = 0.03;

@@ -7,7 +7,6 @@ that the largest memory it had is known, and prints one line of JSON.
 from __future__ import annotations
 
 import json
-import resource
 import subprocess
 import sys
 import tempfile
@@ -18,12 +17,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from hil.analysis.speed import peak_memory_mb
 from hil.core.figures import METRICS
 from hil.study.campaign.findings import documents, outcomes_of
 from hil.study.campaign.maps import write_page
 from hil.study.campaign.plan import Campaign, load_campaign
 from hil.study.campaign.results import PARTS, ResultStore, early_ends, program, programs, schema_of
 
+ROWS = (10, 1_000, 100_000, 1_000_000)
 # As many rows a part as a campaign of short runs writes at a time.
 _PART_ROWS = 2000
 
@@ -84,7 +85,7 @@ def measured(rows: int) -> dict[str, float]:
         "rows": count,
         "merge_s": merged_s - start_s,
         "report_s": end_s - merged_s,
-        "peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
+        "peak_mb": peak_memory_mb(),
     }
 
 

@@ -87,7 +87,9 @@ class Places:
         for first in range(0, there.size, GROUP_ROWS):
             yield self._taken(there[first : first + GROUP_ROWS], schema)
 
-    def _taken(self, wanted: np.ndarray[tuple[int], np.dtype[np.intp]], schema: pa.Schema) -> pa.Table:
+    def _taken(
+        self, wanted: np.ndarray[tuple[int], np.dtype[np.intp]], schema: pa.Schema
+    ) -> pa.Table:
         tables = []
         for source in np.unique(self._source[wanted]).tolist():
             file, group = self._sources[source]

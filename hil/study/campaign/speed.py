@@ -8,27 +8,20 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-import time
 from pathlib import Path
-from random import Random
-
-import pyarrow as pa
 
 from hil.analysis.speed import Figure, measure
-from hil.study.campaign.findings import outcomes_of
-from hil.study.campaign.maps import write_page
+from hil.study.campaign import many_rows
 from hil.study.campaign.plan import Campaign, load_campaign
-from hil.study.campaign.results import row_of, schema_of
 from hil.study.campaign.work import run_campaign
 
 # About so many runs of the built-in campaign `limits`, at the ends of its axes, are what is timed.
 _CAMPAIGN_RUNS = 40
-_REPORT_ROWS = 10_000
 
 
 def campaign_figures(runs: int) -> list[Figure]:
     """Return runs a second of a campaign on all cores, and how much of the workers' time runs take."""
-    campaign = _thinned(load_campaign("limits"))
+    campaign = thinned(load_campaign("limits"))
     shares: list[float] = []
 
     def once() -> float:
@@ -43,32 +36,26 @@ def campaign_figures(runs: int) -> list[Figure]:
 
 
 def report_figures(runs: int) -> list[Figure]:
-    """Return the time of a campaign's answers and page from results of many rows."""
-    campaign = load_campaign("limits")
-    rng = Random(1)
-    names = schema_of(campaign).names
-    figures = [name for name in names if name in {"iae_m_s", "delta1_worst_last_second_m"}]
-    rows = [
-        row_of(job, "complete", "", True, 10.0, [(name, rng.random()) for name in figures])
-        for job in campaign.jobs()[:_REPORT_ROWS]
-    ]
-    table = pa.Table.from_pylist(rows, schema_of(campaign))
-
-    def once() -> float:
-        start_s = time.perf_counter()
-        with tempfile.TemporaryDirectory() as folder:
-            write_page(Path(folder) / "page.html", outcomes_of(campaign, table), "hil bench report")
-        return time.perf_counter() - start_s
-
-    return [measure(f"campaign's page from {len(rows)} rows", "s", "", runs, once)]
+    """Return how long a campaign's results and page take from few rows and from many, and their memory."""
+    figures = []
+    for rows in many_rows.ROWS:
+        found = [many_rows.measured_apart(rows) for _ in range(runs)]
+        for what, unit, goal, key in (
+            ("rows put together", "s", "", "merge_s"),
+            ("answers and page", "s", "", "report_s"),
+            ("largest memory", "MB", "<= 1000", "peak_mb"),
+        ):
+            values = [one[key] for one in found]
+            figures.append(Figure.of(f"campaign of {rows} rows: {what}", unit, values, goal))
+    return figures
 
 
-def _thinned(campaign: Campaign) -> Campaign:
-    """Return the campaign with its first seeds only, so that about _CAMPAIGN_RUNS runs are left."""
+def thinned(campaign: Campaign, runs: int = _CAMPAIGN_RUNS) -> Campaign:
+    """Return the campaign at the ends of its axes with its first seeds: about so many runs are left."""
     file = campaign.file
     first = {axis: [values[0], values[-1]] for axis, values in _lists(campaign).items()}
     combinations = 2 ** len(first) * len(file.outer) * len(file.inner)
-    seeds = max(1, round(_CAMPAIGN_RUNS / combinations))
+    seeds = max(1, round(runs / combinations))
     return Campaign(file.model_copy(update={"grid": first, "seeds": seeds}), campaign.base)
 
 

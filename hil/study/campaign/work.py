@@ -176,4 +176,6 @@ def _go_on(
     finally:
         store.flush()
     wall_s = time.perf_counter() - start_s
-    return store.finish(), Totals(len(jobs), len(jobs) - before, None if dask else count, wall_s, busy_s)
+    return store.finish(), Totals(
+        len(jobs), len(jobs) - before, None if dask else count, wall_s, busy_s
+    )

@@ -1,0 +1,180 @@
+"""How time and memory grow: with the length of a run, the rows of a campaign, its workers.
+
+Runs and rows are measured in processes of their own: their processor time, and the largest memory that
+they had. Workers are timed on the wall.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hil.analysis.speed import Figure
+from hil.core.errors import RigFault
+from hil.study.campaign import many_rows
+from hil.study.campaign.speed import thinned
+from hil.study.campaign.work import run_campaign
+
+LENGTHS_S = (10, 100, 1_000, 3_600, 10_000, 36_000)
+_RUNS = (16, 32, 64)
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """One quantity over another: both in their units, and what it grows by where that was fitted."""
+
+    what: str
+    over: str
+    unit: str
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+
+    @property
+    def slope(self) -> float:
+        """Growth of y a unit of x, by least squares; NaN of one point."""
+        return float(np.polyfit(self.x, self.y, 1)[0]) if len(self.x) > 1 else float("nan")
+
+    def figures(self) -> list[Figure]:
+        """Return the points and the slope as the bench prints them."""
+        points = [
+            Figure.of(f"{self.what}, {x:g} {self.over}", self.unit, [y], "")
+            for x, y in zip(self.x, self.y, strict=True)
+        ]
+        if len(self.x) < 2:
+            return points
+        per = f"{self.unit} per {self.over}"
+        return [*points, Figure.of(f"{self.what}: growth", per, [self.slope], "")]
+
+
+def measured(longest_s: int, most_rows: int, say: Callable[[str], None]) -> list[Series]:
+    """Return every series up to runs of `longest_s` and `most_rows` rows; `say` is told what is begun."""
+    return [
+        *_of_lengths([s for s in LENGTHS_S if s <= longest_s], say),
+        *_of_rows([n for n in many_rows.ROWS if n <= most_rows], say),
+        *_of_workers(say),
+    ]
+
+
+def _of_lengths(lengths_s: list[int], say: Callable[[str], None]) -> list[Series]:
+    found = []
+    for length_s in lengths_s:
+        say(f"run of {length_s} s")
+        found.append(recorded_run(length_s))
+    x = tuple(float(length_s) for length_s in lengths_s)
+    cpu_s, peak_mb, disk_mb = zip(*found, strict=True)
+    return [
+        Series("recorded run, processor time", "s of run", "s", x, cpu_s),
+        Series("recorded run, largest memory", "s of run", "MB", x, peak_mb),
+        Series("recorded run, disk", "s of run", "MB", x, disk_mb),
+    ]
+
+
+def recorded_run(length_s: int) -> tuple[float, float, float]:
+    """Return processor time (s), largest memory (MB) and disk (MB) of a recorded run on the circle."""
+    command = [sys.executable, "-m", "hil.study.campaign.long_run", str(length_s)]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    if done.returncode:
+        raise RigFault(
+            f"run of {length_s} s: ended with status {done.returncode}: {done.stderr[-300:]}"
+        )
+    cpu_s, peak_mb, disk_mb = json.loads(done.stdout)
+    return cpu_s, peak_mb, disk_mb
+
+
+def _of_rows(rows: list[int], say: Callable[[str], None]) -> list[Series]:
+    found = []
+    for count in rows:
+        say(f"{count} rows")
+        found.append(many_rows.measured_apart(count))
+    x = tuple(one["rows"] for one in found)
+    return [
+        Series(what, "rows", unit, x, tuple(one[key] for one in found))
+        for what, unit, key in (
+            ("campaign's rows put together", "s", "merge_s"),
+            ("campaign's answers and page", "s", "report_s"),
+            ("campaign's results, largest memory", "MB", "peak_mb"),
+        )
+    ]
+
+
+def _of_workers(say: Callable[[str], None]) -> list[Series]:
+    cores = os.cpu_count() or 1
+    counts = [n for n in (1, 2, 4, 8, 16, 32) if n <= cores]
+    found = [_of_runs(say)]
+    say("workers")
+    rates = [_rate(_RUNS[-1], workers=n) for n in counts]
+    found.append(Series("campaign", "workers", "runs/s", tuple(map(float, counts)), tuple(rates)))
+    if importlib.util.find_spec("distributed") is None:
+        return found
+    say("Dask workers")
+    rates = []
+    for n in counts:
+        with _cluster(n) as address:
+            rates.append(_rate(_RUNS[-1], dask=address))
+    found.append(
+        Series("campaign", "Dask workers", "runs/s", tuple(map(float, counts)), tuple(rates))
+    )
+    return found
+
+
+def _of_runs(say: Callable[[str], None]) -> Series:
+    """Return how long campaigns of more and more runs take one worker."""
+    say("campaigns of one worker")
+    times_s = tuple(count / _rate(count, workers=1) for count in _RUNS)
+    return Series("campaign of one worker", "runs", "s", tuple(map(float, _RUNS)), times_s)
+
+
+def _rate(runs: int, workers: int | None = None, dask: str | None = None) -> float:
+    """Return runs a second of a campaign of about so many runs, start of the workers included."""
+    campaign = thinned(many_rows.load_campaign("limits"), runs)
+    with tempfile.TemporaryDirectory() as folder:
+        start_s = time.perf_counter()
+        _, totals = run_campaign(campaign, Path(folder) / "sweep", workers, dask)
+        return totals.runs_now / (time.perf_counter() - start_s)
+
+
+@contextmanager
+def _cluster(workers: int) -> Iterator[str]:
+    dask: Any = importlib.import_module("distributed")
+    with dask.LocalCluster(
+        n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50
+    ) as cluster:
+        yield cluster.scheduler_address
+
+
+def write_plot(path: Path, found: list[Series]) -> None:
+    """Draw every series over what it grows with, as SVG, both axes logarithmic."""
+    import matplotlib as mpl  # noqa: PLC0415 - only to draw
+    from matplotlib.backends.backend_svg import FigureCanvasSVG  # noqa: PLC0415
+    from matplotlib.figure import Figure as Sheet  # noqa: PLC0415
+
+    axes_of = {"s of run": 0, "rows": 1, "runs": 2, "workers": 2, "Dask workers": 2}
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "growth", "font.size": 8}):
+        sheet = Sheet(figsize=(11, 3.2), layout="constrained")
+        FigureCanvasSVG(sheet)
+        panels = sheet.subplots(1, 3)
+        for series in found:
+            axes = panels[axes_of[series.over]]
+            label = f"{series.what}, {series.unit}"
+            if series.over in {"runs", "workers", "Dask workers"}:
+                label += f" over {series.over}"
+            axes.plot(series.x, series.y, "o-", ms=3, label=label)
+        for axes, title in zip(panels, ("s of run", "rows", "runs, workers"), strict=True):
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            axes.set_xlabel(title)
+            axes.grid(visible=True, which="major", lw=0.4)
+            axes.legend(fontsize=7)
+        sheet.savefig(path, format="svg", metadata={"Date": None})
