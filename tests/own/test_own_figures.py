@@ -176,17 +176,15 @@ def test_records_are_judged_afterwards_and_read_without_the_file(tmp_path: Path)
 
 
 def test_repeats_and_campaigns_have_it(tmp_path: Path):
-    """Paired differences of an experiment, a column and a drawing of a campaign; workers know the file."""
+    """Paired differences of repeats, a column and a drawing of a campaign; workers know the file."""
     file = written(tmp_path / "near.py", NEAR)
-    deck = written(tmp_path / "deck.toml", 'scenarios = ["scenario-1"]\n')
-    done = hil(
-        "experiment", deck, "--camera", "pose", "--repeats", 2, "--figure", file, "--json",
-        "--out", tmp_path / "exp",
-    )  # fmt: skip
-    assert done.status == 0, done.err
-    (comparison,) = done.json["comparisons"]
-    contrasts = comparison["statistics"]["contrasts"]
+    runs = [tmp_path / f"{law}-{seed}" for law in ("pid", "asg-ism") for seed in (1, 2)]
+    for run in runs:
+        law, seed = run.name.rsplit("-", 1)
+        run_pose("--outer", law, "--seed", seed, "--figure", file, "--out", run)
+    contrasts = hil("compare", *runs, "--json").json["statistics"]["contrasts"]
     assert contrasts[0]["figures"]["near"]["pairs"] == 2
+    assert "within" in hil("compare", *runs).out.partition("All 2 seeds")[2]
     text = (
         'scenario = "scenario-1"\nfigures = ["./near.py"]\n[grid]\n"robot.mass_kg" = [3.0, 3.4]\n'
     )
