@@ -84,6 +84,7 @@ def set_up(chromium: Any, expect: Any) -> None:
         page.set_default_timeout(PATIENCE_S * 1e3)
         page.goto(console.address)
         page.click("nav a[href='#setup']")
+        expect(page.locator("#b-target")).to_have_value(target)
         assert began_bring_up(page, 30)
         page.click('[data-answer="go"]')
         page.click('[data-answer="left forward"]')

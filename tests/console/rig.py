@@ -196,7 +196,7 @@ def film(path: Path, pictures: Sequence[Any], each: int = 10) -> None:
 
 
 def began_bring_up(page: Any, tries: int = 6) -> bool:
-    """Begin a bring-up and see its first question; False where this machine is too busy for its link checks."""
+    """Begin a bring-up and see its first question; False where this machine is too busy for its link."""
     for _ in range(tries):
         page.check("#b-ready")
         page.click("#b-begin")
