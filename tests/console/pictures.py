@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from tests.console.rig import PATIENCE_S, Console, browser, film, served_twin
+from tests.console.rig import PATIENCE_S, Console, began_bring_up, browser, film, served_twin
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "console"
 CHESSBOARD = Path(__file__).parents[1] / "data" / "chessboard"
@@ -84,8 +84,8 @@ def set_up(chromium: Any, expect: Any) -> None:
         page.set_default_timeout(PATIENCE_S * 1e3)
         page.goto(console.address)
         page.click("nav a[href='#setup']")
-        page.check("#b-ready")
-        page.click("#b-begin")
+        expect(page.locator("#b-target")).to_have_value(target)
+        assert began_bring_up(page, 30)
         page.click('[data-answer="go"]')
         page.click('[data-answer="left forward"]')
         page.click('[data-answer="go"]')

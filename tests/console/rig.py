@@ -195,6 +195,19 @@ def film(path: Path, pictures: Sequence[Any], each: int = 10) -> None:
     out.release()
 
 
+def began_bring_up(page: Any, tries: int = 6) -> bool:
+    """Begin a bring-up and see its first question; False where this machine is too busy for its link."""
+    for _ in range(tries):
+        page.check("#b-ready")
+        page.click("#b-begin")
+        page.locator("#b-end .banner").wait_for(state="detached")
+        page.locator('[data-answer="go"], #b-end .banner').first.wait_for()
+        if page.locator('[data-answer="go"]').count():
+            return True
+        page.locator("#b-begin:enabled").wait_for()
+    return False
+
+
 @contextlib.contextmanager
 def browser() -> Iterator[Any]:
     """Start the system's Chromium; skipped where there is none."""

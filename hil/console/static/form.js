@@ -60,7 +60,7 @@ async function load() {
   described = await ask("/api/scenario", { name: byId("scenario").value });
   byId("scenario-said").textContent = described.description;
   fill(byId("settings"), ...described.values.filter((item) => item.meaning).map((item) => el("option", { value: item.key }, item.meaning)));
-  showSetting(); // typed while this was on its way
+  if (!byId("setting-said").childElementCount) showSetting(); // its name was typed while this was on its way
   changed(described);
 }
 

@@ -113,7 +113,7 @@ export function took(row) {
 
 export function paint() {
   if (!byId("tune")?.open) return;
-  const inks = ["line", "right", "est"].slice(-responses.length);
+  const inks = ["quiet", "right", "est"].slice(-responses.length);
   drawChart(byId("chart-step"), [{ ink: "ref", dash: [4, 4], values: [[0, 1], [SHOWN_S, 1]] }, ...responses.map((one, k) => ({ ink: inks[k], values: one.points }))], SHOWN_S, "of the step");
   fill(byId("step-figures"), ...responses.map((one, k) => {
     const made = one.points.find(([, v]) => v >= 0.9)?.[0], most = Math.max(0, ...one.points.map(([, v]) => v));
