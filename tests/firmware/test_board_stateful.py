@@ -19,6 +19,7 @@ from hil.board import _firmware
 from hil.wire import dialect
 from tests.firmware.bench import TICK_S, BoardBench, Motor
 
+_LONGEST_FRAME = 280
 _TIMEOUT_S = 0.25  # SP_TIMEOUT, its default and its largest value
 _W_MAX_RAD_S = {entry.name: entry.default for entry in _firmware.parameter_table()}["W_MAX"]
 # What a duty step may be in a tick is the slew limit's affair; here only the end of the range counts.
@@ -100,8 +101,8 @@ class AnyHost(RuleBasedStateMachine):
 
     @rule(data=st.binary(min_size=1, max_size=200))
     def garbage(self, data: bytes) -> None:
-        """Send bytes that are no frame."""
-        self.bench.receive(data)
+        """Send bytes that are no frame; what they promise to be is over when the next one begins."""
+        self.bench.receive(data + bytes(_LONGEST_FRAME))
         self.pass_time(2)
 
     @rule(command=st.sampled_from([dialect.MAV_CMD_DO_FLIGHTTERMINATION]))
