@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import random
@@ -15,12 +16,15 @@ from pathlib import Path
 import pytest
 
 from hil.config.load import load_scenario
-from hil.core.errors import RecordFault, Stopped
+from hil.core.errors import BadInput, HilError, RecordFault, RigFault, Stopped
+from hil.core.files import unwritable
 from hil.record import recorder
+from hil.record.manifest import write_manifest
 from hil.record.reader import read_run
 from hil.record.recorder import Recorder
 from hil.replays.exact import replay
 from hil.runs.execute import RunSpec, execute, exit_status
+from hil.study.side_by_side import still_to_do
 from tests.ends import drawn
 from tests.ends.commands import COMMANDS
 
@@ -235,3 +239,27 @@ def test_results_that_cannot_be_written_are_no_verdict() -> None:
         )
     assert done.returncode == 3
     assert done.stderr.splitlines() == ["hil: output cannot be written: No space left on device"]
+
+
+@pytest.mark.parametrize(
+    ("number", "kind"),
+    [(errno.ENOSPC, RigFault), (errno.EFBIG, RigFault), (errno.ENOENT, BadInput)],
+)
+def test_a_full_disk_is_a_fault_and_a_wrong_path_is_not(number: int, kind: type[HilError]) -> None:
+    """So that a report on a full disk ends with 3 and one in no folder with 2."""
+    error = unwritable("report x.html", OSError(number, os.strerror(number)))
+    assert type(error) is kind
+    assert str(error) == f"report x.html: cannot be written: {os.strerror(number)}"
+
+
+def test_a_run_whose_record_could_not_be_finished_is_done_anew(tmp_path: Path) -> None:
+    """A fault of the rig is a result; a record that the disk cut short is none."""
+    own = spec(tmp_path / "run", 'faults=[{kind="link_cut", start_s=0.5}]')
+    made = execute(own)
+    assert made.manifest.outcome == "fault"
+    said: list[str] = []
+    assert still_to_do([own], said.append) == []
+    write_manifest(made.path, made.manifest.model_copy(update={"files": {}}))
+    assert still_to_do([own], said.append) == [own]
+    assert "its record could not be finished" in said[0]
+    assert not own.out.exists()

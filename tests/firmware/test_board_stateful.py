@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import math
 
-from hypothesis import HealthCheck, settings
+import pytest
+from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+from hypothesis.stateful import (
+    RuleBasedStateMachine,
+    initialize,
+    invariant,
+    rule,
+    run_state_machine_as_test,
+)
 
 from hil.board import _firmware
 from hil.wire import dialect
 from tests.firmware.bench import TICK_S, BoardBench, Motor
 
+_LONGEST_FRAME = 280
 _TIMEOUT_S = 0.25  # SP_TIMEOUT, its default and its largest value
 _W_MAX_RAD_S = {entry.name: entry.default for entry in _firmware.parameter_table()}["W_MAX"]
 # What a duty step may be in a tick is the slew limit's affair; here only the end of the range counts.
@@ -23,10 +31,12 @@ _SPEEDS = st.floats(-2.0 * _W_MAX_RAD_S, 2.0 * _W_MAX_RAD_S) | st.sampled_from(
 class AnyHost(RuleBasedStateMachine):
     """A host that does anything, and a board with two motors; judged after every tick."""
 
+    make_bench = BoardBench
+
     @initialize()
     def power_up(self) -> None:
         """Switch on: nothing was ever armed."""
-        self.bench = BoardBench()
+        self.bench = self.make_bench()
         self.motors = (Motor(), Motor())
         self.may_move = False  # since an arming that the board acknowledged
         self.silent_s = math.inf  # since the last set-point of finite value within the limit
@@ -66,12 +76,13 @@ class AnyHost(RuleBasedStateMachine):
     def arm(self, right_hashes: bool) -> None:
         """Ask for arming; with a wrong hash it must be refused."""
         wrong = None if right_hashes else 0xDEAD_BEEF
-        self.bench.setpoint(0.0)
+        self.bench.setpoint(0.0)  # a good one, whatever becomes of the arming
+        self.silent_s = 0.0
         result = self.bench.arm(wrong)
         accepted = result == dialect.MAV_RESULT_ACCEPTED
         assert right_hashes or not accepted
         if accepted:
-            self.may_move, self.silent_s = True, 0.0
+            self.may_move = True
         self.pass_time(1)
 
     @rule(left=_SPEEDS, right=_SPEEDS, ticks=st.integers(1, 20))
@@ -82,10 +93,16 @@ class AnyHost(RuleBasedStateMachine):
             self.silent_s = 0.0
         self.pass_time(ticks)
 
+    @rule(left=st.floats(2.0, 10.0), right=st.floats(2.0, 10.0), ticks=st.integers(5, 60))
+    def drive(self, left: float, right: float, ticks: int) -> None:
+        """Arm and drive as a good host does, so that there is motion to be judged."""
+        self.arm(right_hashes=True)
+        self.set_point(left, right, ticks)
+
     @rule(data=st.binary(min_size=1, max_size=200))
     def garbage(self, data: bytes) -> None:
-        """Send bytes that are no frame."""
-        self.bench.receive(data)
+        """Send bytes that are no frame; what they promise to be is over when the next one begins."""
+        self.bench.receive(data + bytes(_LONGEST_FRAME))
         self.pass_time(2)
 
     @rule(command=st.sampled_from([dialect.MAV_CMD_DO_FLIGHTTERMINATION]))
@@ -98,7 +115,9 @@ class AnyHost(RuleBasedStateMachine):
     @rule()
     def reset(self) -> None:
         """Take the supply away and bring it back: the wheels turn on, the board is disarmed."""
-        self.bench = BoardBench(self.bench.t_us + 100_000, tuple(m.counts for m in self.motors))  # type: ignore[arg-type]
+        self.bench = self.make_bench(
+            self.bench.t_us + 100_000, tuple(m.counts for m in self.motors)
+        )  # type: ignore[arg-type]
         self.may_move, self.silent_s = False, math.inf
         assert self.bench.board.state != dialect.HIL_STATE_ARMED
         self.pass_time(1)
@@ -126,3 +145,36 @@ def test_the_rules_do_move_the_wheels() -> None:
     machine.wait(70)
     assert not any(machine.bench.pwm)
     assert not machine.broken
+
+
+class NeverSilent(BoardBench):
+    """A board as if it had no time-out: it is given its last set-point again, whatever the host does."""
+
+    def tick(self, *args: float, **kwargs: float) -> None:
+        """Hear the last set-point once more, then tick."""
+        again = getattr(self, "last", None)
+        if again is not None:
+            super().setpoint(*again)
+        super().tick(*args, **kwargs)  # type: ignore[arg-type]
+
+    def setpoint(self, *speeds: float) -> None:
+        """Keep what was asked."""
+        self.last = speeds
+        super().setpoint(*speeds)
+
+
+class AnyHash(BoardBench):
+    """A board as if it compared no hashes: it is always given the right one."""
+
+    def arm(self, _wrong: int | None = None) -> int:
+        """Arm, whatever was presented."""
+        return super().arm()
+
+
+@pytest.mark.parametrize("bench", [NeverSilent, AnyHash])
+def test_a_board_without_its_checks_is_caught(bench: type[BoardBench]) -> None:
+    """Negative control: a promise is broken, and found so."""
+    machine = type("Broken", (AnyHost,), {"make_bench": bench})
+    found_only = settings(TestAnyHost.settings, phases=[Phase.generate])
+    with pytest.raises(AssertionError):
+        run_state_machine_as_test(machine, settings=found_only)

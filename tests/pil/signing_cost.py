@@ -1,7 +1,7 @@
 """What MAVLink's signature would cost the board: cycles of SHA-256 on the processor, under simavr.
 
 `python -m tests.pil.signing_cost` prints cycles and time of one signed WHEEL_SETPOINT and WHEEL_STATE, and
-the share of the processor at their rates: by the code that mavgen brings along, and by one that is written for
+the share of the processor at their rates: by the code that mavgen brings along, and by one written for
 eight bits (tests/pil/sha256_eight_bits.h). docs/firmware.md has the figures.
 """
 

@@ -24,6 +24,7 @@ from hil.runs.watching import picture_of, stops
 from hil.study.fault_campaign import finished, finished_free, run_fault_free, run_matrix
 from hil.study.fault_free import fault_free, most_ratio
 from hil.study.fault_matrix import run_cell
+from hil.study.work_folder import LOCK, sole_writer
 
 LAWS = ("pid", "asg-ism")
 TICK_S = 1.0 / 30.0
@@ -248,3 +249,23 @@ def test_a_host_kept_from_running_has_figures() -> None:
     assert math.isnan(figures["disturbance_90_m_s3"])
     assert figures["law_ticks"] > 60
     assert record.verdicts()
+
+
+def test_a_second_campaign_of_faults_in_one_folder_is_refused(tmp_path: Path) -> None:
+    """Lines of two writers would be mixed."""
+    with (
+        sole_writer(tmp_path / LOCK, "the first"),
+        pytest.raises(BadInput, match="is writing there"),
+    ):
+        run_fault_free(1, 1, tmp_path, lambda *_: None)
+    assert not (tmp_path / "fault_free.jsonl").exists()
+
+
+def test_a_line_torn_by_a_full_disk_is_dropped_and_the_others_are_kept(tmp_path: Path) -> None:
+    """The next call goes on behind the last whole line, and not within the torn one."""
+    path = tmp_path / "fault_free.jsonl"
+    whole = '{"seed": 1, "said": ""}\n{"seed": 2, "said": "stopped"}\n'
+    path.write_text(whole + '{"seed": 3, "sa')
+    told = run_fault_free(2, 1, tmp_path, lambda *_: None)
+    assert told["alarms"] == 1
+    assert path.read_text() == whole
