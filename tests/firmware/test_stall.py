@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from hil.board import _firmware
 from hil.config.events import Fault
 from hil.wire import dialect
 from tests.firmware.bench import BoardBench, Motor
@@ -120,3 +121,41 @@ def test_starting_stopping_and_turning_about_trips_nothing():
         (-2.0, 2.0),
     ) * 4:
         assert first(drive.run(0.5, left, right), _is_safe) is None
+
+
+def _held(setpoint: float, hold_until_ratio: float) -> tuple[BoardBench, float]:
+    """Return a bench after 6 s at a set-point, its wheels held up to that duty, and the highest duty."""
+    bench = BoardBench()
+    bench.set_param("LAW", 0.0)
+    assert bench.arm() == dialect.MAV_RESULT_ACCEPTED
+    wheels = Motor(dead=hold_until_ratio), Motor(dead=hold_until_ratio)
+    highest = 0.0
+    for _ in range(60):
+        bench.run(wheels, 25, setpoint)
+        highest = max(highest, abs(bench.pwm[0]) / _firmware.PWM_TOP)
+    return bench, highest
+
+
+def test_a_sound_wheel_that_creeps_against_scrubbing_tyres_is_no_stall():
+    """Held up to 0.6 of the duty and asked for 0.1 rad/s: above STALL_DUTY for seconds, and armed."""
+    bench, highest = _held(0.1, 0.6)
+    assert highest > 0.5, "never above STALL_DUTY: the case says nothing"
+    assert bench.board.state == ARMED, name(bench.board.reason)
+
+
+@pytest.mark.parametrize("setpoint", [0.3, 1.0])
+def test_a_wheel_that_is_blocked_is_a_stall_all_the_same(setpoint):
+    """Asked for more than a creep, or pushed at three quarters of the duty and more."""
+    bench, _ = _held(setpoint, 2.0)
+    assert bench.board.state == SAFE
+    assert bench.board.reason in STALL.values(), name(bench.board.reason)
+
+
+@pytest.mark.parametrize("kind", ["dead_channel_a", "dead_encoder"])
+def test_a_dead_encoder_of_a_creeping_wheel_stops_the_robot(kind):
+    """Asked for 0.4 rad/s the duty grows past three quarters, as nothing comes back; then it is a stall."""
+    drive = armed(faults=(Fault(kind=kind, side="left", start_s=0.5),))
+    drive.run(0.5, 0.4, 0.4)
+    stopped = first(drive.run(6.0, 0.4, 0.4), _is_safe)
+    assert stopped is not None
+    assert stopped.reason == STALL["left"], name(stopped.reason)

@@ -22,6 +22,10 @@ constexpr SafetyRule RULES[] = {
 constexpr uint8_t WINDOW_TICKS = 250;  // one second
 constexpr float TICKS_PER_MS = 1000.0f / TICK_US;
 constexpr float TWO_PI_RAD = 6.2831853f;
+// Slower than this a wheel is asked to creep: tyres that scrub while the robot turns on the spot may hold it for
+// long at half the duty and more, so that it is a stall only from so much more duty on.
+constexpr float CRAWL_RAD_S = 0.5f;
+constexpr float CREEPING_DUTY_RATIO = 1.5f;
 
 // Counts ticks in a row; true once `limit` is reached.
 bool lasts(uint16_t& ticks, bool holds, uint16_t limit) {
@@ -74,8 +78,10 @@ bool gets_on(int16_t& net_counts, int16_t moved_counts) {
 }
 
 bool stalls(Tally& t, int16_t& net_counts, const SideView& v, const SafetyLimits& limits) {
-  const bool pushed = v.pwm >= limits.stall_pwm || v.pwm <= -limits.stall_pwm;
-  const bool asked = fabsf(v.setpoint_rad_s) >= limits.stall_setpoint_rad_s;
+  const float asked_rad_s = fabsf(v.setpoint_rad_s);
+  const int16_t high_pwm = asked_rad_s < CRAWL_RAD_S ? limits.stall_creeping_pwm : limits.stall_pwm;
+  const bool pushed = v.pwm >= high_pwm || v.pwm <= -high_pwm;
+  const bool asked = asked_rad_s >= limits.stall_setpoint_rad_s;
   const bool on = gets_on(net_counts, v.moved_counts);
   const bool driven = pushed || asked;
   fade(t);
@@ -107,7 +113,6 @@ void check_encoder(Safety& s, const SafetyLimits& limits, uint16_t illegal_total
 // A pause of a sound wheel between two counts, and the start of one against friction, are shorter than this.
 float pause_ticks(const Params& p) {
   constexpr float START_TICKS = 25.0f;
-  constexpr float CRAWL_RAD_S = 0.5f;
   const float two_counts = 2.0f * TWO_PI_RAD / (p.enc_counts_per_turn * CRAWL_RAD_S * TICK_S);
   return fmaxf(fmaxf(START_TICKS, two_counts), 0.25f * p.stall_ms * TICKS_PER_MS);
 }
@@ -143,6 +148,7 @@ SafetyLimits safety_limits(const Params& p) {
   l.runaway_ticks = ticks_of(p.runaway_ms);
   l.overspeed_ticks = ticks_of(p.overspeed_ms);
   l.stall_pwm = static_cast<int16_t>(p.stall_duty * PWM_TOP);
+  l.stall_creeping_pwm = static_cast<int16_t>(CREEPING_DUTY_RATIO * p.stall_duty * PWM_TOP);
   l.runaway_pwm = static_cast<int16_t>(p.runaway_duty * PWM_TOP);
   l.stall_setpoint_rad_s = p.stall_setpoint_rad_s;
   l.runaway_error_rad_s = p.runaway_error_rad_s;

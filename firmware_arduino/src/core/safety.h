@@ -33,7 +33,7 @@ struct SafetyLimits {
   uint16_t battery_low_mv, battery_good_mv, battery_ticks;
   uint16_t stall_ticks, runaway_ticks, overspeed_ticks;
   uint16_t pause_ticks;  // from here on a wheel that stood while it was driven is remembered
-  int16_t stall_pwm, runaway_pwm;
+  int16_t stall_pwm, stall_creeping_pwm, runaway_pwm;
   float stall_setpoint_rad_s;
   float runaway_error_rad_s;
   float overspeed_rad_s;
