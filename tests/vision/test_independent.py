@@ -86,9 +86,9 @@ def test_a_prediction_leaves_nothing_of_its_error_in_the_answer(condition):
 def test_the_claimed_covariance_is_true(condition):
     """Mean NEES of x, y, theta between 1.2 and 5.4 over 8 frames: chi2 of 24 has that at 99 %.
 
-    Twenty of JPEG, where few patches make the noise and a claim is known to a factor.
+    Twenty of JPEG and extreme, where few patches make the noise and a claim is known to a factor.
     """
-    finder, frames = shown("ceiling", condition, 20 if condition == "jpeg" else 8)
+    finder, frames = shown("ceiling", condition, 20 if condition in {"jpeg", "extreme"} else 8)
     values = [
         nees(seen, frame.truth)
         for frame in frames

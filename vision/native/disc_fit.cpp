@@ -120,8 +120,8 @@ std::optional<Move> robust(const std::array<Move, kRays>& rows, const Round& shi
 }
 
 // Where a change of every ray's edge, in samples, moves the centre.
-Vec2 moved(const Matrix& covariance, const std::array<Move, kRays>& rows, const Round& scale, const Mask& keep,
-           const Round& change) {
+Vec2 moved(const Matrix& covariance, const std::array<Move, kRays>& rows, const Round& scale,
+           const Mask& keep, const Round& change) {
   Move right = {};
   for (int ray = 0; ray < kRays; ++ray) {
     for (int i = 0; keep[ray] && i < 3; ++i) {
