@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from hil.core.rig import whole
 from vision.localisers.marks import MarkLocaliser
-from vision.spread import spread
+from vision.spread import SpreadSearch, spread
 
 if TYPE_CHECKING:
     from hil.core.rig import Picture
@@ -26,7 +26,9 @@ class Looker(Protocol):
 def looker(localiser: Localiser) -> Looker:
     """Return a localiser for the frames of a run, which all take it about as long."""
     made = spread(localiser)
-    return made if isinstance(localiser, MarkLocaliser) else _OfWhole(made)
+    if isinstance(localiser, MarkLocaliser) and isinstance(made, MarkLocaliser | SpreadSearch):
+        return made
+    return _OfWhole(made)
 
 
 class _OfWhole:

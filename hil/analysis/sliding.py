@@ -173,7 +173,10 @@ def _share(columns: Columns, facts: LawFacts) -> float:
     """
     own = ["slide_x_m_s3", "slide_y_m_s3"] if "slide_x_m_s3" in columns else []
     names = [*_OF_SHARE, *own, *RESTING]
-    parts = lambda: (_shares(piece, facts) for piece in pieces(columns, names))  # noqa: E731
+
+    def parts() -> Iterator[tuple[Array, Array]]:
+        return (_shares(piece, facts) for piece in pieces(columns, names))
+
     if not any(np.isfinite(both).any() for _, both in parts()):
         return math.nan
     return median(lambda: (share[~np.isnan(share)] for share, _ in parts()))

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+import numpy as np
+
 from hil.core import _native
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from hil.core.types import Pose, PoseMeasurement, Vec2
@@ -80,7 +81,7 @@ if TYPE_CHECKING:
 
 def whole(picture: Picture) -> NDArray[np.uint8]:
     """Return a picture with all its pixels, (H, W, 3) uint8 BGR."""
-    return picture if hasattr(picture, "tobytes") else picture.whole()
+    return picture if isinstance(picture, np.ndarray) else picture.whole()
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,9 +16,7 @@ HEARD: int
 TAKEN: int
 
 def side_at_limit(pwm_counts: float, lacks_rad_s: float, most_counts: float) -> int: ...
-def driven_hard(
-    left_pwm_counts: float, right_pwm_counts: float, stall_counts: float
-) -> bool: ...
+def driven_hard(left_pwm_counts: float, right_pwm_counts: float, stall_counts: float) -> bool: ...
 def odd_stamp(ahead_s: float) -> str:
     """Return why a frame is not looked at whose exposure would lie `ahead_s` after its arrival."""
 
@@ -141,9 +139,7 @@ class Pump:
     def frame_rows(self, origin_s: float) -> list[tuple[float, ...]]: ...
     def check(self, watch: Watch, now_s: float, pwm_top_counts: int) -> None: ...
     rig_now_s: float
-    def look(
-        self, watch: Watch, now_s: float, most_counts: float, stall_counts: float
-    ) -> Estimate:
+    def look(self, watch: Watch, now_s: float, most_counts: float, stall_counts: float) -> Estimate:
         """Return the state at the actuation time of a tick, inside the fence; else raise RigFault."""
 
     def act(

@@ -43,7 +43,9 @@ def odometry(folder: Path, seed: int) -> tuple[Iterable[Estimate], dict[str, flo
     rng = np.random.default_rng(seed)
     answer = Answer.drawn(rng)
     truth = {"wheel_radius_m": rng.uniform(0.04, 0.06), "track_m": rng.uniform(0.17, 0.27)}
-    log = drive(answer, seed, DURATION_S, radius_m=truth["wheel_radius_m"], track_m=truth["track_m"])
+    log = drive(
+        answer, seed, DURATION_S, radius_m=truth["wheel_radius_m"], track_m=truth["track_m"]
+    )
     fit = fit_log(write_csv(folder / "log.csv", log, wheels=True), None, ROBOT)
     return fit.robot_values, truth
 
@@ -99,9 +101,13 @@ def _print(layer: str, twins: int, found: Rows) -> None:
         held = sum(ok for ok, _ in rows)
         inside, told = inside + held, told + len(rows)
         half = float(np.median([width for _, width in rows]))
-        print(f"{layer} {name}: told {len(rows)} of {twins}, inside {held}, usual half width {half:.4g}")
+        print(
+            f"{layer} {name}: told {len(rows)} of {twins}, inside {held}, usual half width {half:.4g}"
+        )
     low, high = stats.binomtest(inside, told).proportion_ci(0.95, method="exact")
-    print(f"{layer} together: {inside} of {told} inside ({inside / told:.1%}, {low:.1%} to {high:.1%})")
+    print(
+        f"{layer} together: {inside} of {told} inside ({inside / told:.1%}, {low:.1%} to {high:.1%})"
+    )
 
 
 def main() -> None:

@@ -171,7 +171,7 @@ class WheelAnswer:
 def wheel_log(
     path: Path, answer: WheelAnswer, seed: int, duration_s: float = 60.0, load: float = 0.02
 ) -> Path:
-    """Write wheel commands at 20 Hz and wheel speeds at 50 Hz; `load` is a relative error that lasts 0.5 s."""
+    """Write wheel commands at 20 Hz and speeds at 50 Hz; `load` is a relative error that lasts 0.5 s."""
     rng = np.random.default_rng(seed)
     commands = random_commands(rng, duration_s)
     asked = np.column_stack((

@@ -16,21 +16,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hil.board.wheel_laws import WHEEL_LAWS
+from hil.config.fit import board_parameters
 from hil.config.load import load_scenario
 from hil.core import _native as core_native
 from hil.core.clocks import CameraClock
 from hil.record.memory import MemoryRecorder
 from hil.rigs.opening import open_rig
 from hil.runs import intake
-from hil.runs.execute import (
-    RunSpec,
-    board_parameters,
-    execute_in_memory,
-    make_law,
-    make_manifest,
-    make_parts,
-)
+from hil.runs.assembly import make_parts
+from hil.runs.execute import execute_in_memory
+from hil.runs.law_guard import make_law
+from hil.runs.provenance import make_manifest, used_things
 from hil.runs.session import Session
+from hil.runs.spec import RunSpec
 from hil.wire.identity import board_hashes
 
 # Each with what it needs besides its kind; they begin after half a second.
@@ -184,10 +182,10 @@ def test_a_session_with_native_parts_is_forgotten_after_its_run():
     """Native parts keep no way back to their session: a campaign would keep every run."""
     spec = spec_of(ONE)
     rig = open_rig("twin", spec.scenario, "pose", spec.seed)
-    parts = make_parts(spec, rig, MemoryRecorder(make_manifest(spec)), make_law(spec))
-    session = Session(
-        spec.scenario, parts, board_parameters(spec.scenario, spec.inner), board_hashes
-    )
+    parameters = board_parameters(spec.scenario, spec.inner)
+    sink = MemoryRecorder(make_manifest(spec, parameters, used_things(spec)))
+    parts = make_parts(spec, rig, sink, make_law(spec.outer, spec.scenario))
+    session = Session(spec.scenario, parts, parameters, board_hashes)
     assert session.run().outcome == "complete"
     kept = [weakref.ref(session), weakref.ref(rig)]
     del session, parts, rig

@@ -21,13 +21,16 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
+from hil.config.fit import board_parameters
 from hil.config.load import load_scenario
 from hil.record.memory import MemoryRecorder
 from hil.rigs.opening import open_rig
-from hil.runs.execute import RunSpec, board_parameters, make_manifest, make_parts
+from hil.runs.assembly import make_parts
+from hil.runs.law_guard import make_law
 from hil.runs.parts import Situation
+from hil.runs.provenance import make_manifest, used_things
 from hil.runs.session import Session
-from hil.runs.supervision import Supervisor
+from hil.runs.spec import RunSpec
 from hil.wire import dialect
 from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM, FrameWriter
 from hil.wire.identity import board_hashes
@@ -114,8 +117,8 @@ class AnyWorld(RuleBasedStateMachine):
         for at_s in sorted(self.rng.uniform(0.0, 2.0) for _ in range(early)):
             self.rig.later.append((twin.now_s() + at_s, self.anything))
         spec = RunSpec(loaded, "twin", "pose", law, "asg-ism", 1 + seed, Path())
-        self.recorder = MemoryRecorder(make_manifest(spec))
-        parts = make_parts(spec, self.rig, self.recorder)
+        self.recorder = MemoryRecorder(make_manifest(spec, parameters, used_things(spec)))
+        parts = make_parts(spec, self.rig, self.recorder, make_law(law, loaded))
         self.session = Session(loaded, parts, parameters, board_hashes)
         self.steps: Generator[Situation] | None = self.session.steps()
         self.pass_ticks(1)
@@ -249,12 +252,12 @@ TestAnyWorld = AnyWorld.TestCase
 TestAnyWorld.settings = _SETTINGS
 
 
-@pytest.mark.parametrize(("part", "name"), [(Supervisor, "check"), (Session, "_stop")])
+@pytest.mark.parametrize("name", ["_check_safety", "_stop"])
 def test_a_host_without_its_checks_or_its_stop_is_caught(
-    part: type, name: str, monkeypatch: pytest.MonkeyPatch
+    name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Negative control: a promise is broken, and found so."""
-    monkeypatch.setattr(part, name, lambda *_: None)
+    monkeypatch.setattr(Session, name, lambda *_: None)
     found_only = settings(_SETTINGS, phases=[Phase.generate])
     with pytest.raises(AssertionError):
         run_state_machine_as_test(AnyWorld, settings=found_only)
