@@ -44,7 +44,8 @@ class WheelLimits:
         if report is None:
             return False
         wire = report.wire
-        return max(abs(wire.pwm_left_counts), abs(wire.pwm_right_counts)) >= stall_counts > 0.0
+        most = max(abs(wire.pwm_left_counts), abs(wire.pwm_right_counts))
+        return bool(most >= stall_counts > 0.0)
 
     def take(
         self, sides: tuple[int, int], asked_rad_s: float, made_rad_s: float, dt_s: float
