@@ -78,3 +78,11 @@ def test_a_flood_of_frames_makes_no_tick_late(cost):
 def test_the_longest_tick_leaves_room(cost):
     """The board's own account of its longest tick, interrupts during it included."""
     assert 500 < cost.longest_tick_us < 0.6 * 4000
+
+
+def test_the_implicit_wheel_law_costs_less_than_the_default_one(cost):
+    """No division, no root: fewer cycles of control for both wheels, within the same budget."""
+    implicit = measure(robot(), {"LAW": 2.0})
+    control = "tick: control"
+    assert implicit.cycles_per_tick[control] < 0.85 * cost.cycles_per_tick[control]
+    assert 0.1 < implicit.tick_and_link_ratio <= MARGIN * 0.40
