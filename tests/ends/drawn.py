@@ -301,7 +301,9 @@ def main(say: Callable[[str], None] = print) -> int:
     options.add_argument("--only", choices=list(COMMANDS), help="one command")
     options.add_argument("--kind", choices=KINDS, help="one kind of end")
     asked = options.parse_args()
-    for each in SIGNALS:  # in the background they may be ignored, and would be by what is begun here
+    for (
+        each
+    ) in SIGNALS:  # in the background they may be ignored, and would be by what is begun here
         signal.signal(each, signal.default_int_handler)
     tally: collections.Counter[str] = collections.Counter()
     bad = 0
