@@ -98,7 +98,9 @@ if TYPE_CHECKING:
 
 def whole(picture: Picture) -> NDArray[np.uint8]:
     """Return a picture with all its pixels, (H, W, 3) uint8 BGR."""
-    return picture if hasattr(picture, "tobytes") else picture.whole()
+    import numpy as np  # noqa: PLC0415 - only where there are pictures
+
+    return picture if isinstance(picture, np.ndarray) else picture.whole()
 
 
 @dataclass(frozen=True, slots=True)

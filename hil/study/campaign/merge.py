@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import pyarrow as pa
@@ -16,6 +16,9 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from hil.core.files import replacing
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 # Rows of a row group of results.parquet: some 60 MB while it is put together.
 GROUP_ROWS = 1 << 15
@@ -75,9 +78,10 @@ class Places:
         self._again[taken] = bad[free]
 
     @property
-    def done(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def done(self) -> NDArray[np.bool_]:
         """Say of each row whether it need not be run (again)."""
-        return (self._source != _NO_SOURCE) & ~self._again
+        done: NDArray[np.bool_] = (self._source != _NO_SOURCE) & ~self._again
+        return done
 
     def tables(self, schema: pa.Schema) -> Iterator[pa.Table]:
         """Yield the rows there are, in order, each once, a row group at a time."""
@@ -87,9 +91,7 @@ class Places:
         for first in range(0, there.size, GROUP_ROWS):
             yield self._taken(there[first : first + GROUP_ROWS], schema)
 
-    def _taken(
-        self, wanted: np.ndarray[tuple[int], np.dtype[np.intp]], schema: pa.Schema
-    ) -> pa.Table:
+    def _taken(self, wanted: NDArray[np.intp], schema: pa.Schema) -> pa.Table:
         tables = []
         for source in np.unique(self._source[wanted]).tolist():
             file, group = self._sources[source]
