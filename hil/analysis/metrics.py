@@ -183,9 +183,9 @@ def _error_figures(columns: Columns) -> dict[str, float]:
     ise, iae, itae, worst, final = [], [], [], [], math.nan
     for piece in pieces(columns, ["t_s", *names], before=1):
         t_s, error_m = piece["t_s"], np.hypot(*(piece[name] for name in names))
-        ise.append(np.trapezoid(error_m**2, t_s))
-        iae.append(np.trapezoid(error_m, t_s))
-        itae.append(np.trapezoid((t_s - start_s) * error_m, t_s))
+        ise.append(float(np.trapezoid(error_m**2, t_s)))
+        iae.append(float(np.trapezoid(error_m, t_s)))
+        itae.append(float(np.trapezoid((t_s - start_s) * error_m, t_s)))
         last = error_m[t_s >= end_s - LAST_S]
         worst += [last.max()] if last.size else []
         final = float(error_m[-1])
