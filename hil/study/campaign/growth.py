@@ -24,6 +24,7 @@ import numpy as np
 from hil.analysis.speed import Figure
 from hil.core.errors import RigFault
 from hil.study.campaign import many_rows
+from hil.study.campaign.plan import load_campaign
 from hil.study.campaign.speed import thinned
 from hil.study.campaign.work import run_campaign
 
@@ -138,7 +139,7 @@ def _of_runs(say: Callable[[str], None]) -> Series:
 
 def _rate(runs: int, workers: int | None = None, dask: str | None = None) -> float:
     """Return runs a second of a campaign of about so many runs, start of the workers included."""
-    campaign = thinned(many_rows.load_campaign("limits"), runs)
+    campaign = thinned(load_campaign("limits"), runs)
     with tempfile.TemporaryDirectory() as folder:
         start_s = time.perf_counter()
         _, totals = run_campaign(campaign, Path(folder) / "sweep", workers, dask)

@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -33,7 +34,7 @@ def campaign_of(rows: int) -> Campaign:
     """Return the built-in campaign `limits` with more or fewer seeds, so that it has about so many runs."""
     whole = load_campaign("limits")
     points, arms = len(whole.grid_points()), len(whole.file.outer) * len(whole.file.inner)
-    changes = {"seeds": max(1, round(rows / (points * arms)))}
+    changes: dict[str, Any] = {"seeds": max(1, round(rows / (points * arms)))}
     if rows < points * arms:
         axis, values = next(iter(whole.file.grid.items()))
         assert isinstance(values, list)
