@@ -109,21 +109,25 @@ def _disturbance(
 def figures(columns: Columns, who: str, facts: LawFacts) -> dict[str, float]:
     """Return the figures of the sliding term; NaN for a law without a sliding variable."""
     ticks = _Ticks(columns, facts)
-    sizes = lambda: _disturbances(columns, who, facts.d0_m) if ticks.any_s else iter(())  # noqa: E731
+
+    def sizes() -> Iterator[Array]:
+        return _disturbances(columns, who, facts.d0_m) if ticks.any_s else iter(())
+
     middle, bound, most = percentiles(sizes, [50, 90, 100])
     ratio = facts.alpha_m_s3 / bound if bound > 0.0 else math.nan
     layered = ticks.layered
     inside = ticks.inside / ticks.ran if layered else math.nan
     acts = ratio >= GAIN_RATIO and inside >= IN_LAYER_SHARE and layered and ticks.thin
     known = layered and math.isfinite(ratio)
-    ratios = lambda: (s / eps for _, s, eps in _layers(columns))  # noqa: E731
     return {
         "law_ticks": float(ticks.ran),
         "disturbance_median_m_s3": middle,
         "disturbance_90_m_s3": bound,
         "disturbance_max_m_s3": most,
         "alpha_over_d90_ratio": float(ratio),
-        "s_over_eps_median_ratio": median(ratios) if layered else math.nan,
+        "s_over_eps_median_ratio": median(lambda: (s / eps for _, s, eps in _layers(columns)))
+        if layered
+        else math.nan,
         "sliding_term_share": _share(columns, facts) if math.isfinite(most) else math.nan,
         "s_settling_s": ticks.settling_s if layered else math.nan,
         "sliding_acts": float(acts) if known else math.nan,

@@ -80,7 +80,8 @@ class Places:
     @property
     def done(self) -> NDArray[np.bool_]:
         """Say of each row whether it need not be run (again)."""
-        return np.asarray((self._source != _NO_SOURCE) & ~self._again)
+        done: NDArray[np.bool_] = (self._source != _NO_SOURCE) & ~self._again
+        return done
 
     def tables(self, schema: pa.Schema) -> Iterator[pa.Table]:
         """Yield the rows there are, in order, each once, a row group at a time."""
@@ -90,9 +91,7 @@ class Places:
         for first in range(0, there.size, GROUP_ROWS):
             yield self._taken(there[first : first + GROUP_ROWS], schema)
 
-    def _taken(
-        self, wanted: np.ndarray[tuple[int], np.dtype[np.intp]], schema: pa.Schema
-    ) -> pa.Table:
+    def _taken(self, wanted: NDArray[np.intp], schema: pa.Schema) -> pa.Table:
         tables = []
         for source in np.unique(self._source[wanted]).tolist():
             file, group = self._sources[source]
