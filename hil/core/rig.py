@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from hil.core.errors import RigFault
+from hil.core import _native
 
 if TYPE_CHECKING:
     import numpy as np
@@ -25,7 +25,7 @@ class ByteStream(Protocol):
 
 
 # What a port and its driver hold of bytes that the line has not carried yet.
-PORT_BYTES = 4096
+PORT_BYTES = _native.PORT_BYTES
 
 
 @runtime_checkable
@@ -42,30 +42,12 @@ class PortStream(ByteStream, Protocol):
         """Forget what the line has not carried yet; what comes next goes out at once."""
 
 
-class LineBacklog:
-    """How many bytes a serial line still has to carry, from what was written and when."""
+class LineBacklog(_native.LineBacklog):
+    """How many bytes a serial line (baud) still has to carry, from what was written and when.
 
-    def __init__(self, baud: int) -> None:
-        self._bytes_1_s = baud / 10.0  # start, eight data, stop
-        self._free_s = float("-inf")
-
-    def waiting_bytes(self, t_s: float) -> float:
-        """Return the bytes that the line has not carried at `t_s`."""
-        return max(self._free_s - t_s, 0.0) * self._bytes_1_s
-
-    def write(self, t_s: float, size: int) -> None:
-        """Take note of `size` bytes; raises RigFault when the port would have to hold too many."""
-        waiting = self.waiting_bytes(t_s)
-        if waiting + size > PORT_BYTES:
-            raise RigFault(
-                f"port is full: {waiting:.0f} bytes wait for a line of {self._bytes_1_s:.0f} byte/s, "
-                f"it holds {PORT_BYTES}; send less often, or take a faster line"
-            )
-        self._free_s = max(t_s, self._free_s) + size / self._bytes_1_s
-
-    def clear(self) -> None:
-        """Take note that nothing waits any more."""
-        self._free_s = float("-inf")
+    `waiting_bytes(t_s)` are those that it has not carried; `write(t_s, size)` raises RigFault when the port
+    would have to hold more than PORT_BYTES.
+    """
 
 
 def discard_unsent(stream: ByteStream) -> None:
