@@ -89,7 +89,9 @@ class Cost:
         except KeyError as error:
             said = f"raised KeyError: {error}: this run has no such figure; one of your own: --figure FILE.py"
             raise self._refused(said, error) from None
-        except (Exception, SystemExit) as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
             raise self._refused(f"raised {in_one_line(error)}", error) from None
         return min(number, self.failed) if math.isfinite(number) else self.failed
 

@@ -53,7 +53,9 @@ def value_of(entry: Entry, run: RunData) -> float:
         number = math.nan if isinstance(value, str) else float(value)
     except TooLongError as error:
         raise _without(entry, f"took longer than {TIME_MAX_S:g} s", error) from None
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # some libraries end what they do by one that is no Exception
         raise _without(entry, f"raised {in_one_line(error)}", error) from None
     if isinstance(value, str) or math.isinf(number):
         raise _without(entry, f"gave {value!r:.60}, a finite number is needed")

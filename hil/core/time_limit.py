@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from types import FrameType
 
 
-class TooLongError(Exception):
-    """The time of a call is up."""
+class TooLongError(BaseException):
+    """The time of a call is up; no Exception, or code that passes over those would go on for ever."""
 
 
 @contextmanager

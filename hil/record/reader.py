@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -100,7 +101,7 @@ class RunRecord:
         built_in = self._built_in()
         return metrics.RunData(
             columns=own_figures.ReadOnly(self.samples),
-            scenario=self.manifest.scenario,
+            scenario=copy.deepcopy(self.manifest.scenario),
             figures=dict(built_in.values),
             basis=built_in.basis,
             link=self.link_stats(),

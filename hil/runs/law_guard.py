@@ -89,7 +89,9 @@ class GuardedLaw:
             raise
         except TooLongError as error:
             raise self._fault(f"{what} took longer than {STEP_MAX_S:g} s", error) from None
-        except Exception as error:
+        except (KeyboardInterrupt, SystemExit):
+            raise
+        except BaseException as error:
             raise self._fault(f"{what} raised {in_one_line(error)}", error) from None
 
     def _fault(self, said: str, error: BaseException | None = None) -> RigFault:

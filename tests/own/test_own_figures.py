@@ -19,6 +19,7 @@ import hil as api
 from hil.analysis.costs import COST_FAILED, cost_of
 from hil.config.load import load_scenario
 from hil.core.figures import BY_NAME, metric_of
+from hil.core.time_limit import TooLongError, time_limit
 from hil.record.manifest import read_manifest
 from hil.record.reader import read_run
 from hil.study.tune import Plan, candidate_costs
@@ -126,6 +127,7 @@ def test_a_requirement_on_it_decides_the_exit_status(tmp_path: Path):
         ("return run.error_m", r"raised TypeError"),
         ('run.columns["t_s"][0] = 7.0; return 1.0', r"line 8\): raised ValueError: .*read-only"),
         ("raise SystemExit(5)", r"line 8\): raised SystemExit: 5"),
+        ("raise BaseException('over')", r"line 8\): raised BaseException: over"),
     ],
 )
 def test_one_that_fails_leaves_the_record_whole(body: str, said: str, tmp_path: Path):
@@ -144,6 +146,29 @@ def test_one_that_fails_leaves_the_record_whole(body: str, said: str, tmp_path: 
     assert math.isnan(record.figures().values["failing_m"])
     assert math.isfinite(record.figures().values["ise_m2_s"])
     assert hil("replay", out).status == 0
+
+
+def test_what_is_changed_of_the_scenario_is_not_kept(tmp_path: Path):
+    """A figure that writes to the tree it was given changes its own copy: the record says what ran."""
+    body = 'run.scenario["name"] = "other"; run.scenario["requirements"].clear(); return 1.0'
+    file = written(tmp_path / "writing.py", figure_text("writing_m", body))
+    plain, judged = run_pose(*BRIEF, "--out", tmp_path / "plain"), tmp_path / "judged"
+    done = run_pose(*BRIEF, "--figure", file, "--out", judged)
+    assert done.status == plain.status, done.err
+    scenario = read_manifest(judged).scenario
+    before = read_manifest(tmp_path / "plain").scenario
+    assert scenario["name"] == "scenario-1"
+    assert scenario["requirements"] == before["requirements"] != []
+
+
+def test_time_is_up_also_for_code_that_passes_over_errors():
+    """A loop that catches every Exception is ended by the limit like any other."""
+    with pytest.raises(TooLongError), time_limit(0.05):
+        while True:
+            try:
+                sum(range(1000))
+            except Exception:  # noqa: BLE001, S110 - what is tested
+                pass
 
 
 def test_one_that_takes_too_long_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import statistics
 import subprocess
 import sys
@@ -15,7 +16,8 @@ from pydantic import ValidationError
 from hil.config.load import builtin_names
 from hil.core.errors import BadInput
 from hil.study.campaign.axes import Distribution, Range
-from hil.study.campaign.plan import Campaign, load_campaign
+from hil.study.campaign.plan import ROW_COLUMNS, Campaign, load_campaign
+from hil.study.campaign.results import schema_of
 
 
 def campaign(folder: Path, text: str) -> Campaign:
@@ -172,3 +174,35 @@ def test_bounded_normal_is_drawn_again_and_not_piled_up() -> None:
     assert statistics.fmean(values) == pytest.approx(1.2583, abs=0.015)
     with pytest.raises(ValidationError, match="lies within low and high"):
         Distribution(kind="normal", mean=0.0, sd=0.1, low=1.0)
+
+
+@pytest.mark.parametrize(
+    ("grid", "figure", "said"),
+    [
+        ("duration_s = [1.0, 2.0]", "", "duration_s: cannot be varied"),
+        ('"link.loss_ratio" = [0.0, 0.1]', "seed", "figures: seed: another column"),
+        ('"link.loss_ratio" = [0.0, 0.1]', "index", "figures: index: another column"),
+    ],
+)
+def test_no_two_columns_have_one_name(tmp_path: Path, grid: str, figure: str, said: str) -> None:
+    """It is said before anything is run or made: a row has room for one value of a name."""
+    figures = ""
+    if figure:
+        own = tmp_path / f"{figure}_figure.py"
+        own.write_text(
+            f'import hil\n\n\n@hil.figure("{figure}", unit="m", meaning="a test\'s")\n'
+            "def given(run):\n    return 7.0\n"
+        )
+        figures = f'figures = ["{own}"]\n'
+    file = tmp_path / "clash.toml"
+    file.write_text(f'scenario = "scenario-1"\ncamera = "pose"\n{figures}[grid]\n{grid}\n')
+    with pytest.raises(BadInput, match=re.escape(said)):
+        load_campaign(str(file))
+
+
+def test_the_columns_that_names_are_kept_from_are_those_of_the_results():
+    """What is refused as a name is what a row has beside varied values and figures."""
+    made = load_campaign("layer")
+    names = schema_of(made).names
+    assert len(names) == len(set(names))
+    assert set(names) - set(made.axes) - set(made.figures) == ROW_COLUMNS

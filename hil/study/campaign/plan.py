@@ -42,6 +42,10 @@ InnerLawName = Annotated[
 ]
 
 
+# Columns of the results beside what is varied and the figures.
+ROW_COLUMNS = frozenset(
+    {"index", "draw", "seed", "outer", "inner", "outcome", "detail", "holds", "t_end_s", "program"}
+)
 # Unlike the figures of a run, every run has it, also one that ended early.
 HOLDS = Metric(
     "holds",
@@ -285,6 +289,7 @@ def load_campaign(name_or_path: str) -> Campaign:
     asked = tuple(dict.fromkeys((*scenario.figures, *own)))
     base = scenario.model_copy(update={"figures": asked}).model_dump(mode="json")
     campaign = Campaign(file, base)
+    _refuse_taken_names(campaign, path)
     for axis, values in _all_values(campaign).items():
         for value in values:
             campaign.scenario([(axis, value)])
@@ -294,6 +299,21 @@ def load_campaign(name_or_path: str) -> Campaign:
         rows = zip(*lists.values(), strict=True)
         _refuse_twice(campaign, [list(zip(lists, row, strict=True)) for row in rows], path)
     return campaign
+
+
+def _refuse_taken_names(campaign: Campaign, path: Path) -> None:
+    """Raise BadInput where a varied value or a figure has the name of another column of the results."""
+    for name in campaign.axes:
+        if name in campaign.figures or name in ROW_COLUMNS:
+            raise BadInput(
+                f"{path}: {name}: cannot be varied: a column of the results has this name; vary "
+                "another value, or write a campaign for each"
+            )
+    for name in campaign.figures:
+        if name in ROW_COLUMNS:
+            raise BadInput(
+                f"{path}: figures: {name}: another column of the results has this name; rename the figure"
+            )
 
 
 def _refuse_twice(
