@@ -18,6 +18,7 @@ from hil.core.errors import BadInput, RigFault
 from hil.core.rig import Frame, Truth
 from hil.core.types import Covariance, Pose, PoseMeasurement
 from hil.record import layout, tape
+from hil.record.reader import read_events
 from hil.record.tick_rows import COVARIANCE, MARKS
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from hil.record.source import Source
 
 END = "replay: the record ends here"
+HELD = "operator"  # kind of the events of a robot that is kept at rest until somebody arms it
 # What happened in a record, and what was asked there.
 HAPPENED = ("duration_s", "start", "mismatch", "disturbances", "faults")
 _TASK = ("name", "reference", *HAPPENED)
@@ -40,15 +42,20 @@ class ReplayRig:
     """A `Rig` made of a tape, the recorded frames and the recorded truth (for the rows only).
 
     A session that looks at the clock once more or less between two waits than the recorded one did
-    is brought back into step at the next wait.
+    is brought back into step at the next wait. `was_held` says that the robot was to be armed by hand.
     """
 
     def __init__(
-        self, recorded: tape.Tape, frames: Iterator[Frame], truths: Iterator[Truth | None]
+        self,
+        recorded: tape.Tape,
+        frames: Iterator[Frame],
+        truths: Iterator[Truth | None],
+        *,
+        was_held: bool = False,
     ) -> None:
         self._entries: tuple[tuple[bytes, Any], ...] = recorded.entries
         self._at = 0
-        self.was_held = any(order.get("arm") is True for order in recorded.orders())
+        self.was_held = was_held
         self._now_s = math.nan
         self._fresh = False  # the time after a wait was not asked for yet
         self._frames = frames
@@ -228,6 +235,7 @@ def open_replay(source: Source, recorded: Scenario) -> ReplayRig:
         source.tape,
         recorded_frames(source.frames, images),
         recorded_truths(source.samples, true_robot(recorded).d0_m),
+        was_held=any(event.kind == HELD for event in read_events(source.path / layout.EVENTS)),
     )
 
 

@@ -44,6 +44,8 @@ ARMED_WITHIN_S = 600.0
 # A goal moved by hand keeps this far from the fence; one step is at most so long.
 ROOM_M = 0.15
 STEP_MAX_M = 1.0
+# The most that a parameter of the board can be sent as.
+_FLOAT32_MAX = 3.4028234663852886e38
 # They choose what runs and are no numbers to turn; the manifest names the wheel law.
 _SWITCHES = frozenset({"LAW", "ST_SCHEME", "ST_VAR", "ISM_FORM"})
 
@@ -286,7 +288,7 @@ class OperatorOrders:
         try:
             before = self._law.gain(name)
             self._law.change(name, value, reference, estimate)
-        except (ValidationError, AttributeError):
+        except (ValidationError, AttributeError, TypeError):
             self._note(EVENT, f"{LAW}{name}: refused {value:g}")
             return
         self._done(f"{LAW}{name}", before, value)
@@ -297,6 +299,9 @@ class OperatorOrders:
         while self._for_board:
             name, value = self._for_board.popleft()
             before = link.parameters.get(name)
+            if not abs(value) <= _FLOAT32_MAX:
+                self._note(EVENT, f"{BOARD}{name}: refused {value:g}")
+                continue
             try:
                 yield from handshake.set_parameter(link, name, value)
             except RigFault as refused:

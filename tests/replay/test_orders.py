@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -129,6 +130,27 @@ def test_a_robot_that_is_armed_by_hand_rests_until_then(tmp_path):
     waited_s = events["armed by hand"] - events["robot found; it is armed by hand"]
     assert waited_s == pytest.approx(39 / 30, abs=0.02)
     assert events["armed by hand"] < 0.0
+    assert replay(run.path).identical
+
+
+@pytest.mark.parametrize(
+    ("orders", "said"),
+    [
+        ([ARM], None),
+        ([{"set": "board.ST_L0", "value": math.inf}], "board.ST_L0: refused inf"),
+        ([{"set": "board.FF_DEAD", "value": 1e300}], "board.FF_DEAD: refused 1e+300"),
+        ([{"set": "board.FF_DEAD", "value": math.nan}], "board.FF_DEAD: refused nan"),
+        ([{"set": "board.NOPE", "value": 1.0}], "has no parameter 'NOPE'"),
+        ([{"set": "law.k1_s", "value": math.nan}], "law.k1_s: refused nan"),
+        ([{"set": "law.model_config", "value": 1.0}], "law.model_fields: refused 1"),
+        ([{"step": [math.nan, 0.0]}], "not within 0.15 m of the fence"),
+    ],
+)
+def test_odd_orders_end_no_run_and_its_replay_is_exact(tmp_path, orders, said):
+    """Whoever gives orders past the checks of the console: an event says what was not done."""
+    run = tuned(tmp_path / "run", {20: orders}, overrides=["duration_s=1"])
+    assert run.manifest.outcome == "complete"
+    assert [said in text for text in told(run)] == ([True] if said else [])
     assert replay(run.path).identical
 
 
