@@ -142,7 +142,7 @@ def test_a_robot_that_is_armed_by_hand_rests_until_then(tmp_path):
         ([{"set": "board.FF_DEAD", "value": math.nan}], "board.FF_DEAD: refused nan"),
         ([{"set": "board.NOPE", "value": 1.0}], "has no parameter 'NOPE'"),
         ([{"set": "law.k1_s", "value": math.nan}], "law.k1_s: refused nan"),
-        ([{"set": "law.model_config", "value": 1.0}], "law.model_fields: refused 1"),
+        ([{"set": "law.model_config", "value": 1.0}], "law.model_config: refused 1"),
         ([{"step": [math.nan, 0.0]}], "not within 0.15 m of the fence"),
     ],
 )
