@@ -159,14 +159,15 @@ def _item(entry: Entry, registry: Registry) -> Item:
 
 
 def _first_words(kind: str, name: str) -> str:
-    """Return what a file says of itself: its description, or the first line of its comment."""
+    """Return what a file says of itself: its description, or its comment's first line's first sentence."""
     text = (files("hil") / "data" / kind / f"{name}.toml").read_text(encoding="utf-8")
     said = parse_toml(text, f"{name}.toml").get("description")
     if said:
         return str(said)
     lines = (line for line in text.splitlines() if not line.startswith("#:"))  # a note to editors
     first = next(lines, "")
-    return first.removeprefix("#").strip() if first.startswith("#") else ""
+    sentence, stop, _ = first.removeprefix("#").strip().partition(". ")
+    return sentence + stop.strip() if first.startswith("#") else ""
 
 
 def _short(value: Any) -> str:
