@@ -245,6 +245,8 @@ class OutsidePlant:
         where = f"line {own[-1][2]}: " if own else ""
         status = self._process.returncode
         ended = "closed its output" if status is None else f"ended with status {status}"
+        if not last and status == 0:
+            return f"{ended} and said nothing; a plant's file ends with hil.serve_plant(...)"
         return f"{ended}: {where}{last[:160]}" if last else ended
 
     def close(self) -> None:

@@ -293,7 +293,7 @@ def _motion_figures(columns: Columns, who: str) -> dict[str, float]:
 def _effort_figures(columns: Columns) -> dict[str, float]:
     left, right = "pwm_left_counts", "pwm_right_counts"
     return {
-        "control_energy_m2_s3": _held_integral(columns, "zeta_m_s2", "u2_m_s2"),
+        "control_energy_m2_s3": _control_energy(columns),
         "pwm_energy_counts2_s": _held_integral(columns, left, right),
         "eta1_variation_m_s": _variation(columns, "eta1_cmd_m_s"),
         "theta_dot_variation_rad_s": _variation(columns, "theta_dot_cmd_rad_s"),
@@ -333,6 +333,18 @@ def _timing_figures(columns: Columns, link: LinkStats) -> dict[str, float]:
         "exposure_to_actuation_p99_s": to_actuation_s[1],
         "deadline_misses": _sum(misses),
     }
+
+
+def _control_energy(columns: Columns) -> float:
+    """Integrate |u|²; NaN for a law that ran and never gave its u, whatever the control stop gave."""
+    ran, told = False, False
+    for piece in pieces(columns, list(sliding.RESTING)):
+        mine = sliding.law_ran(piece)
+        ran = ran or bool(mine.any())
+        told = told or bool(np.isfinite(piece["zeta_m_s2"][mine] + piece["u2_m_s2"][mine]).any())
+    if ran and not told:
+        return math.nan
+    return _held_integral(columns, "zeta_m_s2", "u2_m_s2")
 
 
 def _held_integral(columns: Columns, one: str, other: str) -> float:

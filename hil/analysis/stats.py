@@ -55,7 +55,8 @@ class Paired:
     the tapes, which holds it in `median_coverage` of all studies however the differences are
     distributed. `effect` is Hedges' g_z: the mean difference over the standard
     deviation of the differences, corrected for small samples; infinite when every pair differs
-    alike. `lower_share` is the share of pairs in which the other is lower, ties counted half.
+    alike, NaN for two pairs, where the correction leaves nothing of it.
+    `lower_share` is the share of pairs in which the other is lower, ties counted half.
     `rank_p` is Wilcoxon's signed-rank p, over the tapes.
     """
 
@@ -215,6 +216,8 @@ def _hedges(difference: Array, spread: float) -> float:
         return math.nan
     if spread == 0.0:
         return 0.0 if mean == 0.0 else math.copysign(math.inf, mean)
+    if count == 2:  # the exact correction for one degree of freedom is 0
+        return math.nan
     return mean / spread * (1.0 - 3.0 / (4.0 * (count - 1) - 1.0))
 
 

@@ -240,6 +240,8 @@ def _table(verdict: Verdict) -> Table:
 
 def _cell(result: Paired, metric: Metric | None) -> str:
     """Return a difference above its interval; green is better, red is worse, plain is unsure."""
+    if result.pairs == 0:  # a law without such a figure
+        return "–"
 
     def text(value: float) -> str:
         number = metric.text(abs(value), with_unit=False) if metric else f"{abs(value):.3f}"

@@ -75,6 +75,7 @@ def command(
     from hil.runs.execute import new_folder
     from hil.study import verdict_page
     from hil.study.campaign.workers import Pool
+    from hil.study.front_search import require_optuna
     from hil.study.parts_off import parts_of
     from hil.study.suite import OnSuite
     from hil.study.verdict import SHORT, Field, VerdictPlan, verdict_data
@@ -92,6 +93,7 @@ def command(
     given = {names.get(key, key): value for key, value in asked.items() if value}
     plan = replace(plan, **given)
     field = Field.of(deck, plan, outers)
+    require_optuna()
     file = out or new_folder("verdict") / "verdict.json"
     file.parent.mkdir(parents=True, exist_ok=True)
     data: dict[str, Any] = {}

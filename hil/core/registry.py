@@ -179,7 +179,7 @@ class Registry:
         )
         return (
             f"{self.kind} {name!r}: not built in and in no installed package ({self.group}); "
-            f"near: {', '.join(near)}; or name a file: ./{name}.py{broken}"
+            f"near: {', '.join(near)}; or name a file: {_as_file(name)}{broken}"
         )
 
     def _find_all(self) -> None:
@@ -276,8 +276,9 @@ class Registry:
 
     def _choose(self, source: SourceText, found: tuple[Entry, ...], wanted: str) -> Entry:
         if not found:
+            what = "class" if self._methods else "class or function"
             raise BadInput(
-                f"{self.kind} {source.path}: registers no {self.kind}; a file needs a class under "
+                f"{self.kind} {source.path}: registers no {self.kind}; a file needs a {what} under "
                 f"@hil.{self.group.rsplit('.', maxsplit=1)[-1].removesuffix('s')}(...); "
                 f"`hil new` writes one"
             )
@@ -320,6 +321,13 @@ def is_file_name(name: str) -> bool:
     """Say whether a name means a file: `x.py`, `x.py:Name`, or anything with a folder in it."""
     path, _, _ = _split_file_name(name)
     return path.endswith(".py") or "/" in path or "\\" in path
+
+
+def _as_file(name: str) -> str:
+    """Return the file that a name that is none may have meant."""
+    return (
+        f"./{name}.py" if name.isidentifier() or not Path(name).suffix else "one that ends in .py"
+    )
 
 
 def _split_file_name(name: str) -> tuple[str, str, str]:

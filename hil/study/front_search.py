@@ -95,7 +95,7 @@ def search_front(
     also: Sequence[Mapping[str, float]] = (),
 ) -> Front:
     """Return what a search of `candidates` candidates tried; `also` are tried after the start."""
-    optuna = _optuna()
+    optuna = require_optuna()
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     study = optuna.create_study(directions=["minimize"] * 3, sampler=sampler(optuna, seed))
     names = list(box)
@@ -128,7 +128,8 @@ def _point_of(box: Box, values: Mapping[str, float]) -> list[float]:
     return point
 
 
-def _optuna() -> Any:
+def require_optuna() -> Any:
+    """Return the module; raises BadInput where it is not installed."""
     try:
         import optuna  # noqa: PLC0415 - heavy, and not everybody has it
     except ImportError:

@@ -289,8 +289,12 @@ def with_origin(
 
 
 def write_gain_set(path: Path, gains: Gains) -> None:
-    """Write a gain file as hil/data/gains holds them."""
-    lines = ["#:schema ../schemas/gains.json", "# Written by hil.study.tune; not edited by hand."]
+    """Write a gain file as hil/data/gains holds them; it names its schema where that lies beside."""
+    beside = path.absolute().parents[1] / "schemas" / "gains.json"
+    lines = ["#:schema ../schemas/gains.json"] if beside.is_file() else []
+    lines += [
+        "# Written by hil.study.tune. In a scenario the table [LAW] of it is [control.gains.tuned.LAW]."
+    ]
     for table, values in gains.model_dump().items():
         lines += ["", f"[{table}]"]
         lines += [

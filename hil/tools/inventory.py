@@ -114,12 +114,21 @@ def listing(kind: str, from_files: Sequence[str] = ()) -> Listing:
     if kind in BY_PLURAL:
         return _registered(kind, BY_PLURAL[kind], from_files)
     if from_files:
-        raise BadInput(f"{from_files[0]}: {kind} do not come from Python files")
+        raise BadInput(f"{from_files[0]}: {_not_listed(kind, from_files[0])}")
     if kind == "wheel-laws":
         items = [Item(name, f"{said}, on the board") for name, said in SUMMARIES.items()]
     else:
         items = [Item(name, _first_words(kind, name)) for name in builtin_names(kind)]
     return Listing(kind, tuple(items))
+
+
+def _not_listed(kind: str, file: str) -> str:
+    """Return why a file of one's own is not listed, and what tells of it instead."""
+    if kind == "robots":
+        return f"a robot's file is not listed but checked: hil check robot {file}"
+    if kind == "scenarios":
+        return f"a scenario's file is not listed but run: hil run {file}"
+    return f"{kind} of one's own are not listed: no file is given here"
 
 
 def _registered(kind: str, registry: Registry, from_files: Sequence[str]) -> Listing:
@@ -150,13 +159,15 @@ def _item(entry: Entry, registry: Registry) -> Item:
 
 
 def _first_words(kind: str, name: str) -> str:
-    """Return what a file says of itself: its description, or the first line of its comment."""
+    """Return what a file says of itself: its description, or its comment's first line's first sentence."""
     text = (files("hil") / "data" / kind / f"{name}.toml").read_text(encoding="utf-8")
     said = parse_toml(text, f"{name}.toml").get("description")
     if said:
         return str(said)
-    first = text.splitlines()[0]
-    return first.removeprefix("#").strip() if first.startswith("#") else ""
+    lines = (line for line in text.splitlines() if not line.startswith("#:"))  # a note to editors
+    first = next(lines, "")
+    sentence, stop, _ = first.removeprefix("#").strip().partition(". ")
+    return sentence + stop.strip() if first.startswith("#") else ""
 
 
 def _short(value: Any) -> str:

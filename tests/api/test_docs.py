@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+import hil
+
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
@@ -77,6 +79,24 @@ def test_tutorial_runs(tmp_path: Path) -> None:
     assert all(page.startswith("<iframe srcdoc=") for page in pages)
 
 
+def test_exported_names_and_pages_agree() -> None:
+    """Each name of `hil` is on a page, and each `hil.NAME` that a block of Python uses is one of them."""
+    texts = {page.name: page.read_text("utf-8") for page in DOCS.glob("*.md")}
+    told = "\n".join(text for name, text in texts.items() if name != "changelog.md")
+    rest = {
+        "RigFault",
+        "WheelSample",
+        "__version__",
+    }  # all of hil.core.errors and hil.core.types are
+    assert [name for name in hil.__all__ if name not in told and name not in rest] == []
+    blocks = "\n".join(re.findall(r"```python.*?\n(.*?)```", told, re.DOTALL))
+    used = set(re.findall(r"(?<![\w./])hil\.([A-Za-z_]\w*)", blocks))
+    assert len(used) > 20
+    assert used - set(hil.__all__) <= {"config", "core", "record", "api"}, (
+        "a room, or a name not exported"
+    )
+
+
 def test_site_builds_without_a_warning(tmp_path: Path) -> None:
     """Strict: every link and anchor inside the docs leads somewhere; search and reference are there."""
     pytest.importorskip("mkdocs", reason="extra docs is not installed: pip install '.[docs]'")
@@ -95,5 +115,7 @@ def test_site_builds_without_a_warning(tmp_path: Path) -> None:
     for name in ("run", "experiment", "compare", "replay", "open_record", "make_env"):
         assert f'id="hil.api.{name}"' in reference, name
     assert 'id="hil.study.gym_env.HilEnv"' in reference
+    for name in ("check_law", "check_estimator", "check_robot", "check_cost"):
+        assert f"{name}<" in reference or f".{name}" in reference, name
     assert (site / "search/search_index.json").stat().st_size > 100_000
     assert "https://fonts" not in reference

@@ -114,6 +114,20 @@ def test_written_gains_are_the_ones_evaluated(tuned, tmp_path):
     assert Gains.model_validate(read) == gains
 
 
+def test_a_gain_set_names_the_schema_only_where_it_lies(tuned, tmp_path):
+    """Beside the schemas it names them, elsewhere it has no note that leads nowhere."""
+    gains, _ = tuned
+    (tmp_path / "schemas").mkdir()
+    (tmp_path / "gains").mkdir()
+    (tmp_path / "schemas" / "gains.json").write_text("{}")
+    write_gain_set(tmp_path / "gains" / "set.toml", gains)
+    write_gain_set(tmp_path / "set.toml", gains)
+    assert (
+        (tmp_path / "gains" / "set.toml").read_text().startswith("#:schema ../schemas/gains.json")
+    )
+    assert "#:schema" not in (tmp_path / "set.toml").read_text()
+
+
 def test_a_gain_at_the_edge_of_its_box_is_named():
     """Where the box decided and not the cost; in the middle of every box nothing is said."""
     middle = BASE

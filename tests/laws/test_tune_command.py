@@ -1,6 +1,7 @@
 """`hil tune` from the command line: search, verdict, file; with made-up runs in real workers."""
 
 import json
+import math
 import tomllib
 from importlib.resources import files
 
@@ -9,9 +10,11 @@ import pytest
 from click.testing import CliRunner
 
 import hil.study.tune_work
-from hil.cli.tune import command
+from hil.analysis.stats import paired
+from hil.cli.tune import _cell, command
 from hil.config.gains import Gains
 from hil.core.errors import BadInput
+from hil.core.figures import BY_NAME
 from hil.study.campaign.results import program
 from hil.study.tune import Plan, case_scenario
 from hil.study.tune_work import Journal, identity_of, load_tasks
@@ -167,3 +170,10 @@ def invoke(words, expected=None):
     if expected is not None:
         assert isinstance(run.exception, expected), run.exception
     return run
+
+
+def test_a_figure_that_a_law_does_not_have_is_a_dash():
+    """No pair has a difference of it: a dash, and no sign before one; a difference keeps its sign."""
+    metric = BY_NAME["control_energy_m2_s3"]
+    assert _cell(paired([0.3, 0.4, 0.5], [math.nan] * 3), metric) == "–"
+    assert _cell(paired([0.3, 0.4, 0.5], [0.5, 0.5, 0.6]), metric).startswith("+0.13")

@@ -49,6 +49,22 @@ def test_unknown_kind_and_bad_file_are_refused(tmp_path: Path):
     assert "registers no outer law" in command("list", "laws", none).refusal
 
 
+def test_files_that_ship_say_what_they_are():
+    """Robots, decks and campaigns are told in words, not by a note to editors; a robot's file is checked."""
+    for kind in ("robots", "decks", "campaigns"):
+        for item in command("list", kind, "--json").json[kind]["items"]:
+            assert " " in item["summary"], item
+            assert "schema" not in item["summary"], item
+    assert "hil check robot my.toml" in command("list", "robots", "my.toml").refusal
+
+
+def test_a_file_that_is_no_python_is_not_offered_as_one():
+    """Where another kind of file is named as a law, the way out is a file that ends in .py."""
+    said = command("run", "scenario-1", "--outer", "gains.toml").refusal
+    assert "or name a file: one that ends in .py" in said
+    assert "or name a file: ./pdi.py" in command("run", "scenario-1", "--outer", "pdi").refusal
+
+
 def test_list_shows_a_file_beside_the_rest(tmp_path: Path):
     """With a file named, what it registers is listed with its path and its own trace."""
     file = written(tmp_path / "listed.py", law_text("listed-law"))

@@ -230,7 +230,10 @@ def test_repeats_and_campaigns_have_it(tmp_path: Path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("x = 1\n", "registers no figure of merit"),
+        (
+            "x = 1\n",
+            "registers no figure of merit; a file needs a class or function under @hil.figure",
+        ),
         ("def broken(:\n", "line 1: SyntaxError"),
         ("raise OSError('no disk')\n", "line 1: OSError: no disk"),
         (NEAR.replace('"near"', '"ise_m2_s"'), "two have this name"),

@@ -92,6 +92,18 @@ def test_energies_hold_each_value_until_the_next_tick():
     assert math.isnan(values()["control_energy_m2_s3"])
 
 
+def test_a_law_that_never_gives_its_u_has_no_control_energy():
+    """The zeros of the control stop are not the law's: no energy, in place of one of 0."""
+    rest = T_S > 6.0
+    stopped = {name: np.where(rest, 0.0, np.nan) for name in ("v1_m_s3", "u2_m_s2", "zeta_m_s2")}
+    stopped |= {name: np.where(rest, 0.0, 0.2) for name in ("eta1_cmd_m_s", "theta_dot_cmd_rad_s")}
+    assert math.isnan(values(**stopped)["control_energy_m2_s3"])
+    told = stopped | {"zeta_m_s2": np.where(rest, 0.0, 3.0), "u2_m_s2": np.where(rest, 0.0, 4.0)}
+    assert values(**told)["control_energy_m2_s3"] == pytest.approx(25.0 * 6.01)
+    held = {name: 0.0 for name in stopped}
+    assert values(**held)["control_energy_m2_s3"] == 0.0, "a run that the stop held throughout"
+
+
 def test_variation_sums_every_change():
     """A square wave of amplitude 2 with 10 edges varies by 40; a constant does not vary."""
     square = np.where(np.floor(T_S / 10 * 11 + 1e-9) % 2 == 0, 2.0, -2.0)[:-1]

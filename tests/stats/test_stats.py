@@ -52,6 +52,14 @@ def test_differences_equal_but_for_rounding_are_equal() -> None:
     assert math.isinf(shifted.effect)
 
 
+def test_two_pairs_have_no_effect_size() -> None:
+    """With one degree of freedom Hedges' correction is 0: no size, and not one of 0; three have one."""
+    assert math.isnan(paired([1.0, 2.0], [1.5, 3.0]).effect)
+    assert paired([1.0, 2.0], [1.5, 3.0]).mean == 0.75
+    # Differences 0.5, 1, 0.75: mean 0.75, sd 0.25, correction 1 - 3/7.
+    assert paired([1.0, 2.0, 3.0], [1.5, 3.0, 3.75]).effect == pytest.approx(3.0 * 4.0 / 7.0)
+
+
 def test_copies_of_a_seed_are_no_further_evidence() -> None:
     """Six seeds at twenty points that hardly differ are six tapes: the interval of the six."""
     rng = np.random.default_rng(4)

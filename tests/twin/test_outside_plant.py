@@ -186,6 +186,10 @@ def test_a_port_of_this_machine_is_asked_every_tick_with_what_acts():
     ("wrong", "said"),
     [
         ("sys.exit(3)", "ended with status 3"),
+        (
+            "sys.exit(0)",
+            "ended with status 0 and said nothing; a plant's file ends with hil.serve_plant",
+        ),
         ("state['x_m'] / 0", "ended with status 1: line 8: ZeroDivisionError"),
         ("state['theta_rad'] = math.nan", "answered theta_rad = nan at t = 1.504 s"),
         ("state['x_m'] = 'far'", "answered x_m = 'far' at t = 1.504 s"),

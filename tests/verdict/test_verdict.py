@@ -2,6 +2,7 @@
 
 import copy
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -152,6 +153,16 @@ def test_verdict_from_the_command_line(tmp_path):
     assert kept.output.startswith(document["says"]["first_line"])
     with pytest.raises(BadInput, match="exists already"):
         CliRunner().invoke(command, asked, standalone_mode=False, catch_exceptions=False)
+
+
+def test_without_optuna_a_verdict_is_refused_before_anything_is_run(tmp_path, monkeypatch, capsys):
+    """One line with the extra to install, no word of a law judged, and no folder left behind."""
+    monkeypatch.setitem(sys.modules, "optuna", None)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(BadInput, match="needs Optuna; install it: pip install 'skid-steer-hil"):
+        CliRunner().invoke(command, ["--short"], standalone_mode=False, catch_exceptions=False)
+    assert list(tmp_path.iterdir()) == []
+    assert capsys.readouterr().err == ""
 
 
 def test_kept_data_that_are_none_are_refused(tmp_path):
