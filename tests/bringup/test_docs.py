@@ -14,7 +14,12 @@ from hil.cli.main import cli
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "docs" / name for name in ("bring-up.md", "debugging.md")]
 SOURCES = [
-    *(path for name in ("hil", "vision", "sim_twin") for path in (ROOT / name).rglob("*.py")),
+    *(
+        path
+        for name in ("hil", "vision", "sim_twin")
+        for ending in ("*.py", "*.cpp", "*.hpp")
+        for path in (ROOT / name).rglob(ending)
+    ),
     ROOT / "firmware_arduino/src/core/texts.def",
     ROOT / "hil/wire/hil.xml",
 ]

@@ -136,7 +136,7 @@ def test_every_setting_can_be_set_and_its_bounds_are_those_of_the_message() -> N
 def test_bounds_in_words() -> None:
     """What a listing shows of bounds."""
     assert ALL["robot.mass_kg", ""].bounds() == "0.5 to 50"
-    assert ALL["duration_s", ""].bounds() == "above 0 to 3600"
+    assert ALL["duration_s", ""].bounds() == "above 0 to 36000"
     assert ALL["camera.lens.fx_px", ""].bounds() == "above 10"
     assert ALL["camera.robot_look.tag.tag_id", ""].bounds() == "from 0"
     assert ALL["reference.rate_rad_s", "circle"].default == 0.1

@@ -41,10 +41,10 @@ def test_the_page_from_top_to_bottom(hil: Command, monkeypatch: pytest.MonkeyPat
     """The mapping is one, each command ends well, the robot file tells the distance scale."""
     write_logs(next(text for kind, text in BLOCKS if kind == "toml"))
     ran: list[str] = []
-    measured: list[int] = []
+    measured: list[tuple[str, int]] = []
 
-    def measure(twins: int) -> dict[str, list[tuple[bool, float]]]:
-        measured.append(twins)
+    def measure(layer: str, twins: int) -> dict[str, list[tuple[bool, float]]]:
+        measured.append((layer, twins))
         return {"veer_rad_m": [(True, 1.0)]}
 
     for kind, text in BLOCKS:
@@ -60,6 +60,6 @@ def test_the_page_from_top_to_bottom(hil: Command, monkeypatch: pytest.MonkeyPat
                 coverage_script.main()
             ran.append(words[0])
     assert ran.count("hil") == 4
-    assert measured == [20]
+    assert measured == [(layer, 20) for layer in coverage_script.LAYERS]
     assert '"body.distance_scale_ratio"' in Path("my_robot.toml").read_text(encoding="utf-8")
     assert Path("my_robot.html").is_file()
