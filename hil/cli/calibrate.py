@@ -84,9 +84,9 @@ def camera(
     if picture is not None:
         write_image(picture, figures.coverage_picture(result))
     if as_json:
-        print_json(summary.lens_document(result, views.missed, camera_file))
+        print_json(summary.lens_document(result, views, camera_file))
     else:
-        click.echo(summary.lens_text(result, views.missed, camera_file))
+        click.echo(summary.lens_text(result, views, camera_file))
 
 
 # A camera whose cable was pulled while the board was carried about is waited for so long.

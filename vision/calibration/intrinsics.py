@@ -267,6 +267,16 @@ def _view_error(view: BoardView, lens: Array) -> float:
     return float(np.sqrt(np.mean(np.sum(residuals(view, lens, place) ** 2, axis=1))))
 
 
+def off_lens_px(others: Sequence[BoardView], view: BoardView, size_px: tuple[int, int]) -> float:
+    """Return a view's RMS residual in px under the lens of other views; raises BadInput for few."""
+    if len(others) < VIEWS_MIN:
+        raise BadInput(
+            f"lens: {view.name} is turned by 90 deg against {len(others)} others, at least"
+            f" {VIEWS_MIN} are needed to see which way; turn all of them alike"
+        )
+    return _view_error(view, _fit(others, size_px)[0])
+
+
 def residuals(view: BoardView, lens: Array, place: Array) -> Array:
     """Return seen minus projected corners, (N, 2), px."""
     difference: Array = view.px - cv_compat.project(lens, place, view.board_m)

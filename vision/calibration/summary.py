@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from vision.calibration.floor import FloorCalibration, error_budget
 from vision.calibration.intrinsics import LensCalibration
 from vision.calibration.plausible import LENS_NAMES
+from vision.calibration.views import Views
 
 HEIGHT_ADVICE = (
     "focal length and camera height cannot be told apart from floor points: give --camera-height,"
@@ -16,8 +16,8 @@ HEIGHT_ADVICE = (
 )
 
 
-def lens_document(result: LensCalibration, missed: Sequence[str], file: Path) -> dict[str, Any]:
-    """Return the figures of a lens calibration; `missed` names images without the board."""
+def lens_document(result: LensCalibration, views: Views, file: Path) -> dict[str, Any]:
+    """Return the figures of a lens calibration, with what the images gave and did not."""
     return {
         "camera_file": str(file),
         "width_px": result.width_px,
@@ -33,12 +33,13 @@ def lens_document(result: LensCalibration, missed: Sequence[str], file: Path) ->
             for v in result.views
         ],
         "alike": [{"name": name, "like": like} for name, like in result.alike],
-        "not_seen": list(missed),
+        "not_seen": views.missed,
+        "brought_to_one_size": views.brought,
         "advice": list(result.advice),
     }  # fmt: skip
 
 
-def lens_text(result: LensCalibration, missed: Sequence[str], file: Path) -> str:
+def lens_text(result: LensCalibration, views: Views, file: Path) -> str:
     """Return the lens calibration as lines."""
     fx, fy, cx, cy = result.lens[:4]
     lines = [
@@ -56,8 +57,9 @@ def lens_text(result: LensCalibration, missed: Sequence[str], file: Path) -> str
     if result.alike:
         names = ", ".join(f"{name} (as {like})" for name, like in result.alike)
         lines.append(f"counted once, the board in the same place: {names}")
-    if missed:
-        lines.append(f"board not seen in {', '.join(missed)}")
+    if views.missed:
+        lines.append(f"board not seen in {', '.join(views.missed)}")
+    lines += views.brought
     lines += [f"to make it better: {advice}" for advice in result.advice]
     return "\n".join([*lines, f"written to {file}; next: hil calibrate floor"])
 
