@@ -13,14 +13,9 @@ from numpy.typing import NDArray
 
 from hil.core.errors import BadInput
 from vision import cv_compat
+from vision.calibration.advice import advise, coverage
 from vision.calibration.boards import Board, BoardView, not_seen_hint
-from vision.calibration.intrinsics import (
-    advise,
-    coverage,
-    distance_px,
-    off_lens_px,
-    slant_deg,
-)
+from vision.calibration.intrinsics import distance_px, off_lens_px, slant_deg
 from vision.calibration.one_size import SizedView, at_one_size
 from vision.sources import ImageFolder, LiveCamera, VideoFile, image_files
 
