@@ -204,10 +204,12 @@ def _fit_without_outliers(
                 " are needed; add views from other sides and tilts"
             )
         fit = fit_lens(kept, size_px, fisheye=fisheye)
-        left_out = _left_out(kept, fit, size_px)
-        worst = int(np.argmax(left_out))
-        if not _is_outlier(left_out, worst):
+        left_out, rest_px = _left_out(kept, fit, size_px)
+        outliers = [k for k in range(len(kept)) if _is_outlier(left_out, k)]
+        if not outliers:
             return kept, dropped, fit, left_out
+        # One bad view sets good ones apart too: the one without which the others agree best is it.
+        worst = min(outliers, key=lambda k: (rest_px[k], -left_out[k]))
         dropped.append((kept.pop(worst), float(fit.errors[worst]), float(left_out[worst])))
         if len(dropped) > DROP_RATIO_MAX * len(views):
             names = ", ".join(gone[0].name for gone in dropped)
@@ -217,24 +219,28 @@ def _fit_without_outliers(
             )
 
 
-def _left_out(views: Sequence[BoardView], fit: LensFit, size_px: tuple[int, int]) -> Array:
+def _left_out(
+    views: Sequence[BoardView], fit: LensFit, size_px: tuple[int, int]
+) -> tuple[Array, Array]:
     """Return each view's RMS residual under the lens of all others, px, in their reach.
 
-    A view that is off pulls the lens to itself and so hides in the fit's own residuals.
+    The second has the RMS residual of the others among themselves, infinite where not known. A view that is off pulls the lens to itself and so hides in the fit's own residuals.
     """
-    errors = fit.errors.copy()
+    errors, rest_px = fit.errors.copy(), np.full(len(views), math.inf)
     if len(views) <= VIEWS_MIN:
-        return errors
+        return errors, rest_px
     for k in np.argsort(-errors)[:JUDGED_MAX]:
         others = [*views[:k], *views[k + 1 :]]
         try:
-            lens = fit_lens(others, size_px, fisheye=fit.lens.fisheye).lens
+            start = fit.lens, np.delete(fit.places, k, axis=0)
+            without = fit_lens(others, size_px, fisheye=fit.lens.fisheye, start=start)
         except BadInput:  # the others alone determine none: the view is judged in the fit
             continue
+        lens, rest_px[k] = without.lens, _rms(without.errors, others)
         inside = _out_px(views[k], lens) <= _reach_px(others, lens)
         if np.mean(~inside) <= ALONE_CORNERS_RATIO:
             errors[k] = lens.error_px(_part(views[k], inside))
-    return errors
+    return errors, rest_px
 
 
 def _reach_px(views: Sequence[BoardView], lens: Lens) -> float:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from hil.core.errors import BadInput
 from vision import cv_compat
 from vision.calibration.boards import BoardView
-from vision.camera import CameraModel
+from vision.camera import CameraModel, distort
 
 Array = NDArray[np.float64]
 Size = tuple[int, int]
@@ -25,9 +25,12 @@ Size = tuple[int, int]
 # What of the nine lens numbers a fisheye fit moves: all but the decentring p1 and p2.
 FREE = np.array([0, 1, 2, 3, 4, 5, 8])
 STARTS_F_RATIO = (0.2, 0.3, 0.45, 0.7, 1.0, 1.6)  # focal lengths over the image's width
-STEPS_MAX = 60
+START_VIEWS = 5
+STEPS_MAX = 40
+STEPS_FROM_NEAR = 3
 STEP_RATIO = 1e-6
-SETTLED = 1e-9
+SETTLED = 1e-6
+DAMPING_MAX = 1e4
 RAY_MAX = 12.0  # tan 85 deg: corners further out say nothing of a board's place
 
 
@@ -50,10 +53,12 @@ class Lens:
         if not self.fisheye:
             return cv_compat.project(self.numbers, place, board_m)
         seen = board_m @ cv_compat.rotation(place[:3]).T + place[3:]
-        seen[:, 2] = np.maximum(seen[:, 2], 1e-6)
-        return self.camera((1, 1)).project(seen)
+        z = np.maximum(seen[:, 2], 1e-6)
+        fx, fy, cx, cy, *dist = self.numbers
+        u, v = distort(seen[:, 0] / z, seen[:, 1] / z, (*dist,), fisheye=True)
+        return np.column_stack((fx * u + cx, fy * v + cy))
 
-    def place(self, view: BoardView) -> Array:
+    def place(self, view: BoardView, steps: int = 3) -> Array:
         """Return the rotation and translation vectors, (6,), of a view's board; BadInput for none."""
         if not self.fisheye:
             return cv_compat.board_place(self.numbers, view.board_m, view.px)
@@ -64,7 +69,7 @@ class Lens:
             raise BadInput(f"lens: {view.name} has too few corners that a fisheye lens can see")
         straight = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
         place = cv_compat.board_place(straight, view.board_m[good], rays[good])
-        for _ in range(5):
+        for _ in range(steps):
             slopes = _place_slopes(self, view, place)
             rest = self.residuals(view, place).ravel()
             place = place + np.linalg.lstsq(slopes, rest, rcond=None)[0]
@@ -90,11 +95,22 @@ class LensFit:
     places: Array
 
 
-def fit_lens(views: Sequence[BoardView], size_px: Size, *, fisheye: bool = False) -> LensFit:
-    """Return the lens fitted to the views; raises BadInput where they do not determine one."""
+def fit_lens(
+    views: Sequence[BoardView],
+    size_px: Size,
+    *,
+    fisheye: bool = False,
+    start: tuple[Lens, Array] | None = None,
+) -> LensFit:
+    """Return the lens fitted to the views; raises BadInput where they do not determine one.
+
+    `start` is a fisheye lens near the answer, with the views' places.
+    """
     try:
         if fisheye:
-            return _fit_fisheye(views, size_px)
+            if start is not None:
+                return _fit_fisheye(views, *start, STEPS_FROM_NEAR)
+            return _fit_fisheye(views, *_start(views, size_px), STEPS_MAX)
         fit = cv_compat.calibrate([v.board_m for v in views], [v.px for v in views], size_px)
     except (cv_compat.CvError, np.linalg.LinAlgError) as error:
         text = str(error).split("error:")[-1].split("\n")[0].strip()
@@ -102,45 +118,43 @@ def fit_lens(views: Sequence[BoardView], size_px: Size, *, fisheye: bool = False
     return LensFit(Lens(fit[0]), *fit[1:])
 
 
-def _fit_fisheye(views: Sequence[BoardView], size_px: Size) -> LensFit:
-    lens, places = _start(views, size_px)
+def _fit_fisheye(views: Sequence[BoardView], lens: Lens, places: Array, steps_max: int) -> LensFit:
     damping, cost = 1e-3, _cost(lens, views, places)
-    for _ in range(STEPS_MAX):
+    for _ in range(steps_max):
         rest, slopes = _system(lens, views, places)
         normal, right = slopes.T @ slopes, slopes.T @ rest
-        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12), right)
-        numbers = lens.numbers.copy()
-        numbers[FREE] += step[: len(FREE)]
-        tried, tried_places = Lens(numbers, True), places + step[len(FREE) :].reshape(-1, 6)
-        new = _cost(tried, views, tried_places)
-        if not new < cost:
-            if damping > 1e6:
+        before = cost
+        while damping < DAMPING_MAX:
+            step = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12), right)
+            numbers = lens.numbers.copy()
+            numbers[FREE] += step[: len(FREE)]
+            tried, moved = Lens(numbers, True), places + step[len(FREE) :].reshape(-1, 6)
+            new = _cost(tried, views, moved)
+            if new < cost:
+                lens, places, cost, damping = tried, moved, new, 0.1 * damping
                 break
             damping *= 10.0
-            continue
-        gain, lens, places, cost = cost - new, tried, tried_places, new
-        damping *= 0.1
-        if gain < SETTLED * cost:
+        if before - cost <= SETTLED * cost:
             break
     return _judged(lens, views, places)
 
 
 def _start(views: Sequence[BoardView], size_px: Size) -> tuple[Lens, Array]:
     """Return the equidistant lens that fits best of some focal lengths, with the boards' places."""
-    best: tuple[float, Lens, Array] | None = None
+    some = views[:: max(1, len(views) // START_VIEWS)]
+    best: tuple[float, Lens] | None = None
     for ratio in STARTS_F_RATIO:
         f_px, middle = ratio * size_px[0], (0.5 * (size_px[0] - 1), 0.5 * (size_px[1] - 1))
         lens = Lens(np.array([f_px, f_px, *middle, 0.0, 0.0, 0.0, 0.0, 0.0]), True)
         try:
-            places = np.array([lens.place(view) for view in views])
+            cost = _cost(lens, some, np.array([lens.place(view, 0) for view in some]))
         except (BadInput, cv_compat.CvError, np.linalg.LinAlgError):
             continue
-        cost = _cost(lens, views, places)
         if np.isfinite(cost) and (best is None or cost < best[0]):
-            best = cost, lens, places
+            best = cost, lens
     if best is None:
         raise BadInput("lens: the views do not determine a fisheye lens; tilt the board")
-    return best[1], best[2]
+    return best[1], np.array([best[1].place(view, 0) for view in views])
 
 
 def _judged(lens: Lens, views: Sequence[BoardView], places: Array) -> LensFit:
