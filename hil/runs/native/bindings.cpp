@@ -147,7 +147,8 @@ void bind_plausibility(nb::module_& m) {
       .def("check_progress", &Plausibility::check_progress, "now_s"_a, "error_m"_a)
       .def("finish", &Plausibility::finish);
   m.def("side_at_limit", &WheelLimits::side, "pwm_counts"_a, "lacks_rad_s"_a, "most_counts"_a);
-  m.def("driven_hard", &WheelLimits::driven_hard, "left_pwm_counts"_a, "right_pwm_counts"_a, "stall_counts"_a);
+  m.def("driven_hard", &WheelLimits::driven_hard, "left_pwm_counts"_a, "right_pwm_counts"_a,
+        "stall_counts"_a);
   m.def("odd_stamp", &runs::odd_stamp, "ahead_s"_a);
   nb::class_<RowFormat>(m, "RowFormat")
       .def(
@@ -246,13 +247,12 @@ class EstimateMaker {
     const nb::object pose =
         filled(pose_, {"x_m", "y_m", "theta_rad"},
                {nb::float_(s.pose.x_m), nb::float_(s.pose.y_m), nb::float_(s.pose.theta_rad)});
-    return filled(
-        estimate_,
-        {"t_host_s", "pose", "eta1_m_s", "theta_dot_rad_s", "z1_m", "z2_m_s", "z3_m_s2", "sides_at_limit",
-         "driven_hard"},
-        {nb::float_(t_s), pose, nb::float_(s.eta1_m_s), nb::float_(s.theta_dot_rad_s),
-         nb::make_tuple(s.z1_m[0], s.z1_m[1]), nb::make_tuple(s.z2_m_s[0], s.z2_m_s[1]), nb::none(),
-         nb::make_tuple(sides[0], sides[1]), nb::bool_(hard)});
+    return filled(estimate_,
+                  {"t_host_s", "pose", "eta1_m_s", "theta_dot_rad_s", "z1_m", "z2_m_s", "z3_m_s2",
+                   "sides_at_limit", "driven_hard"},
+                  {nb::float_(t_s), pose, nb::float_(s.eta1_m_s), nb::float_(s.theta_dot_rad_s),
+                   nb::make_tuple(s.z1_m[0], s.z1_m[1]), nb::make_tuple(s.z2_m_s[0], s.z2_m_s[1]), nb::none(),
+                   nb::make_tuple(sides[0], sides[1]), nb::bool_(hard)});
   }
 
  private:

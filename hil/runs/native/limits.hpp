@@ -19,7 +19,8 @@ class WheelLimits {
 
   // Whether a side is driven with what the board would call a stall if its wheel stood.
   static bool driven_hard(double left_pwm_counts, double right_pwm_counts, double stall_counts) {
-    return stall_counts > 0.0 && std::fmax(std::fabs(left_pwm_counts), std::fabs(right_pwm_counts)) >= stall_counts;
+    return stall_counts > 0.0 &&
+           std::fmax(std::fabs(left_pwm_counts), std::fabs(right_pwm_counts)) >= stall_counts;
   }
 
   // One tick: sides at their limit, turn rate asked and made.
