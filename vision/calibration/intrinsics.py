@@ -224,7 +224,8 @@ def _left_out(
 ) -> tuple[Array, Array]:
     """Return each view's RMS residual under the lens of all others, px, in their reach.
 
-    The second has the RMS residual of the others among themselves, infinite where not known. A view that is off pulls the lens to itself and so hides in the fit's own residuals.
+    The second has the RMS residual of the others among themselves, infinite where not known.
+    A view that is off pulls the lens to itself and so hides in the fit's own residuals.
     """
     errors, rest_px = fit.errors.copy(), np.full(len(views), math.inf)
     if len(views) <= VIEWS_MIN:
