@@ -54,9 +54,9 @@ Vec2 Camera::normalise(Vec2 px) const {
   for (int step = 0; step < kNewtonSteps; ++step) {
     const Vec2 rest = target - distort(at);
     const double r2 = at.x * at.x + at.y * at.y;
-    const Radial bend = fisheye ? fisheye_radial(r2)
-                                : Radial{1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)),
-                                         2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))};
+    const Radial bend =
+        fisheye ? fisheye_radial(r2)
+                : Radial{1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)), 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))};
     const auto [radial, slope] = bend;
     const double cross = at.x * at.y * slope + 2.0 * p1 * at.x + 2.0 * p2 * at.y;
     const double xx = radial + at.x * at.x * slope + 2.0 * p1 * at.y + 6.0 * p2 * at.x;
