@@ -8,10 +8,10 @@ import pytest
 
 from hil.core.errors import BadInput
 from tests.calibration.render import LENS, hand_held
-from vision import cv_compat
 from vision.calibration.boards import BoardView, parse_board
 from vision.calibration.files import lens_tables, read_camera, update_camera
 from vision.calibration.intrinsics import calibrate_lens
+from vision.calibration.lens_fit import Lens
 from vision.camera import CameraModel
 from vision.camera_setup import camera_model
 from vision.disc_fit import compiled
@@ -145,9 +145,9 @@ def test_partly_seen_boards_count():
 
 
 def test_a_view_no_fisheye_can_see():
-    """Fewer than four corners with a ray: named, not a trace from inside."""
-    lens = calibrate_lens(held(LENS), SIZE, "fisheye")
-    assert lens.fisheye
-    with pytest.raises(BadInput, match="at least 5"):
-        calibrate_lens(held(LENS)[:3], SIZE, "fisheye")
-    assert cv_compat.PLACE_POINTS_MIN == 4
+    """Corners beyond 90 degrees from the axis have no ray: named, not a trace from inside."""
+    lens = Lens(np.array([280.0, 280.0, 320.0, 240.0, 0.0, 0.0, 0.0, 0.0, 0.0]), fisheye=True)
+    view = held(WIDE)[0]
+    assert lens.error_px(view) < 10.0
+    with pytest.raises(BadInput, match=r"^lens: view 0 has too few corners"):
+        lens.place(replace(view, name="view 0", px=view.px + 2000.0))
