@@ -280,6 +280,7 @@ class View:
     cx: float
     cy: float
     dist: Sequence[float]
+    fisheye: bool
     R: Sequence[float]
     t: Sequence[float]
 

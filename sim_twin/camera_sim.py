@@ -184,6 +184,7 @@ def _view(camera: CameraConfig) -> _native.View:
     view.width, view.height = model.width_px, model.height_px
     view.fx, view.fy, view.cx, view.cy = model.fx_px, model.fy_px, model.cx_px, model.cy_px
     view.dist = list(model.dist)
+    view.fisheye = model.fisheye
     view.R = model.R_world_cam.ravel().tolist()
     view.t = model.t_world_cam_m.tolist()
     return view

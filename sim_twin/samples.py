@@ -128,6 +128,7 @@ def _truth(camera: CameraConfig) -> str:
     eye = ", ".join(f"{x!r}" for x in map(float, model.t_world_cam_m))
     return (
         f"width_px = {model.width_px}\nheight_px = {model.height_px}\n\n"
-        f"[lens]\nat_width_px = {model.width_px}\nat_height_px = {model.height_px}\n{lens}\n\n"
+        f"[lens]\nfisheye = {str(model.fisheye).lower()}\n"
+        f"at_width_px = {model.width_px}\nat_height_px = {model.height_px}\n{lens}\n\n"
         f"[pose]\neye_m = [{eye}]\nR_world_cam = [{rotation}]\n"
     )

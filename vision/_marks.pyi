@@ -22,6 +22,7 @@ class Camera:
         distortion: Sequence[float],
         rotation: Sequence[float],
         centre_m: Sequence[float],
+        fisheye: bool = False,
     ) -> None: ...
 
 class Disc:

@@ -9,6 +9,10 @@ k2, p1, p2, k3).
 The maths is written out here and not taken from cv2: `cv2.undistortPoints` stops 0.1 px short of
 the answer at image corners with its default criteria, and a call for one point costs more than
 the sum itself.
+
+A wide lens is `fisheye`: a ray at angle theta from the axis lies at theta (1 + k1 theta^2 +
+k2 theta^4 + k3 theta^6) from the centre (Kannala and Brandt 2006; `cv2.fisheye` with k4 = 0), p1
+and p2 as before. Rays at 90 degrees and more have no place here.
 """
 
 from __future__ import annotations
@@ -26,13 +30,28 @@ Distortion = tuple[float, float, float, float, float]
 
 NEWTON_STEPS_MAX = 20
 NEWTON_TOLERANCE = 1e-13
+# Below this squared radius a fisheye's factor is that at it: 1 to 1e-10.
+R2_SMALL = 1e-10
 
 
-def distort(x: Scalars, y: Scalars, dist: Distortion) -> tuple[Scalars, Scalars]:
-    """Return the distorted normalised coordinates of (x, y) (OpenCV's model)."""
+def _fisheye_radial(r2: Scalars, dist: Distortion) -> tuple[Scalars, Scalars]:
+    """Return the radial factor of a fisheye lens and its slope, (d factor / dr) / r."""
+    k1, k2, _, _, k3 = dist
+    r = np.sqrt(np.maximum(r2, R2_SMALL))
+    theta = np.arctan(r)
+    t2 = theta * theta
+    factor = theta * (1.0 + t2 * (k1 + t2 * (k2 + t2 * k3))) / r
+    rise = (1.0 + t2 * (3.0 * k1 + t2 * (5.0 * k2 + t2 * 7.0 * k3))) / (1.0 + r * r)
+    return factor, (rise - factor) / (r * r)
+
+
+def distort(
+    x: Scalars, y: Scalars, dist: Distortion, *, fisheye: bool = False
+) -> tuple[Scalars, Scalars]:
+    """Return the distorted normalised coordinates of (x, y) (OpenCV's models)."""
     k1, k2, p1, p2, k3 = dist
     r2 = x * x + y * y
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    radial = _fisheye_radial(r2, dist)[0] if fisheye else 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
     xy2 = 2.0 * x * y
     xd = x * radial + p1 * xy2 + p2 * (r2 + 2.0 * x * x)
     yd = y * radial + p1 * (r2 + 2.0 * y * y) + p2 * xy2
@@ -40,13 +59,16 @@ def distort(x: Scalars, y: Scalars, dist: Distortion) -> tuple[Scalars, Scalars]
 
 
 def distort_jacobian(
-    x: Scalars, y: Scalars, dist: Distortion
+    x: Scalars, y: Scalars, dist: Distortion, *, fisheye: bool = False
 ) -> tuple[Scalars, Scalars, Scalars, Scalars]:
     """Return d(xd)/dx, d(xd)/dy, d(yd)/dx, d(yd)/dy of `distort`."""
     k1, k2, p1, p2, k3 = dist
     r2 = x * x + y * y
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))
+    if fisheye:
+        radial, slope = _fisheye_radial(r2, dist)
+    else:
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))
     cross = x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y
     xx = radial + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x
     yy = radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
@@ -54,13 +76,13 @@ def distort_jacobian(
 
 
 def _newton_step(
-    x: Scalars, y: Scalars, xd: Scalars, yd: Scalars, dist: Distortion
+    x: Scalars, y: Scalars, xd: Scalars, yd: Scalars, dist: Distortion, *, fisheye: bool
 ) -> tuple[Scalars, Scalars]:
     """Return the Newton correction (dx, dy) towards distort(x, y) == (xd, yd)."""
-    ex, ey = distort(x, y, dist)
+    ex, ey = distort(x, y, dist, fisheye=fisheye)
     ex = xd - ex
     ey = yd - ey
-    xx, xy, yx, yy = distort_jacobian(x, y, dist)
+    xx, xy, yx, yy = distort_jacobian(x, y, dist, fisheye=fisheye)
     det = xx * yy - xy * yx
     return (yy * ex - xy * ey) / det, (xx * ey - yx * ex) / det
 
@@ -81,6 +103,7 @@ class CameraModel:
     dist: Distortion
     R_world_cam: Array
     t_world_cam_m: Array
+    fisheye: bool = field(default=False, kw_only=True)
     # The pose again as plain floats: the scalar path runs for every frame.
     _r: tuple[float, ...] = field(init=False, repr=False)
     _t: tuple[float, ...] = field(init=False, repr=False)
@@ -127,7 +150,7 @@ class CameraModel:
         points = np.asarray(points_world_m, dtype=np.float64).reshape(-1, 3)
         cam = (points - self.t_world_cam_m) @ self.R_world_cam
         z = np.where(cam[:, 2] > 0.0, cam[:, 2], np.nan)
-        xd, yd = distort(cam[:, 0] / z, cam[:, 1] / z, self.dist)
+        xd, yd = distort(cam[:, 0] / z, cam[:, 1] / z, self.dist, fisheye=self.fisheye)
         return np.stack((self.fx_px * xd + self.cx_px, self.fy_px * yd + self.cy_px), axis=1)
 
     def project_point(self, x_m: float, y_m: float, z_m: float) -> tuple[float, float]:
@@ -139,7 +162,7 @@ class CameraModel:
             return math.nan, math.nan
         xc = (r[0] * dx + r[3] * dy + r[6] * dz) / zc
         yc = (r[1] * dx + r[4] * dy + r[7] * dz) / zc
-        xd, yd = distort(xc, yc, self.dist)
+        xd, yd = distort(xc, yc, self.dist, fisheye=self.fisheye)
         return self.fx_px * xd + self.cx_px, self.fy_px * yd + self.cy_px
 
     def normalise(self, px: ArrayLike) -> Array:
@@ -153,7 +176,7 @@ class CameraModel:
         x, y = xd.copy(), yd.copy()
         step = np.zeros_like(x)
         for _ in range(NEWTON_STEPS_MAX):
-            dx, dy = _newton_step(x, y, xd, yd, self.dist)
+            dx, dy = _newton_step(x, y, xd, yd, self.dist, fisheye=self.fisheye)
             x += dx
             y += dy
             step = np.abs(dx) + np.abs(dy)
@@ -170,7 +193,7 @@ class CameraModel:
         yd = (v_px - self.cy_px) / self.fy_px
         x, y, dist = xd, yd, self.dist
         for _ in range(NEWTON_STEPS_MAX):
-            dx, dy = _newton_step(x, y, xd, yd, dist)
+            dx, dy = _newton_step(x, y, xd, yd, dist, fisheye=self.fisheye)
             x += dx
             y += dy
             if abs(dx) + abs(dy) < NEWTON_TOLERANCE:
@@ -215,7 +238,7 @@ class CameraModel:
                 [r[3] * dz - r[6] * dy, r[4] * dz - r[7] * dy],
             ]
         )
-        xx, xy, yx, yy = distort_jacobian(x, y, self.dist)
+        xx, xy, yx, yy = distort_jacobian(x, y, self.dist, fisheye=self.fisheye)
         det = xx * yy - xy * yx
         undistort = np.array(
             [[yy / self.fx_px, -xy / self.fy_px], [-yx / self.fx_px, xx / self.fy_px]]

@@ -31,6 +31,7 @@ def camera_model(config: CameraConfig) -> CameraModel:
         (lens.k1, lens.k2, lens.p1, lens.p2, lens.k3),
         rotation,
         np.array(pose.eye_m),
+        fisheye=lens.fisheye,
     )
     if lens.shift_degree:
         shift = np.column_stack((lens.shift_u, lens.shift_v))

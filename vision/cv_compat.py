@@ -39,6 +39,8 @@ ITERATIONS = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 100, 1e-4)
 # Half of each tag cell's width left out of the vote: bits survive blur and a slanted view.
 CELL_MARGIN_RATIO = 0.3
 CORNER_WINDOW_CELLS = 0.8
+# solvePnP's start from a plane wants so many.
+PLACE_POINTS_MIN = 4
 
 IMAGE_SUFFIXES = {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"}
 PICTURE_SUFFIXES = (".png", ".jpg")

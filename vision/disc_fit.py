@@ -38,6 +38,7 @@ def compiled(model: CameraModel) -> _marks.Camera:
         model.dist,
         model.R_world_cam.ravel().tolist(),
         model.t_world_cam_m.tolist(),
+        model.fisheye,
     )
 
 

@@ -55,6 +55,8 @@ command.add_command(marks)
 @file_option
 @click.option("--views", "wanted", type=click.IntRange(5, 200), default=20, show_default=True,
               help="Views to take from a live camera.")  # fmt: skip
+@click.option("--lens", "kind", type=click.Choice(["auto", "pinhole", "fisheye"]), default="auto",
+              show_default=True, help="auto: what fits views it was not fitted to.")  # fmt: skip
 @picture_option
 @json_option
 def camera(
@@ -62,6 +64,7 @@ def camera(
     board_text: str,
     detector: str,
     camera_file: Path,
+    kind: str,
     wanted: int,
     picture: Path | None,
     as_json: bool,
@@ -79,14 +82,14 @@ def camera(
     require_place(camera_file)
     require_place(picture, PICTURE_SUFFIXES)
     views = _views(source, parse_board(board_text, detector), wanted)
-    result = calibrate_lens(views.require(VIEWS_MIN).views, views.size_px)
+    result = calibrate_lens(views.require(VIEWS_MIN).views, views.size_px, kind)
     files.update_camera(camera_file, files.lens_tables(result))
     if picture is not None:
         write_image(picture, figures.coverage_picture(result))
     if as_json:
-        print_json(summary.lens_document(result, views.missed, camera_file))
+        print_json(summary.lens_document(result, views, camera_file))
     else:
-        click.echo(summary.lens_text(result, views.missed, camera_file))
+        click.echo(summary.lens_text(result, views, camera_file))
 
 
 # A camera whose cable was pulled while the board was carried about is waited for so long.

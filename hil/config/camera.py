@@ -40,6 +40,10 @@ class LensConfig(Section):
     fy_px: float = quantity("px", "square pixels", 620.0, gt=10.0)
     cx_px: float = quantity("px", "a few px off the middle (319.5) as lenses are", 323.4)
     cy_px: float = quantity("px", "a few px off the middle (239.5) as lenses are", 236.8)
+    fisheye: bool = Field(
+        False,
+        description="k1 to k3 are terms of the ray's angle from the axis (a wide lens), not of its tangent",
+    )
     k1: float = quantity(
         "", "barrel", -0.16, ge=-1.0, le=1.0, source="half that of OpenCV's samples"
     )

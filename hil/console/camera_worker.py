@@ -24,9 +24,10 @@ from hil.console.hand_over import FRAME_LENGTH, HEAD, JSON, PICTURE, jpeg
 from hil.core.errors import HilError, RigFault
 from hil.rigs.frames import open_source
 from vision import cv_compat
+from vision.calibration.advice import advise, coverage
 from vision.calibration.boards import Board, BoardView, parse_board
 from vision.calibration.files import read_camera
-from vision.calibration.intrinsics import advise, coverage, slant_deg
+from vision.calibration.intrinsics import slant_deg
 from vision.calibration.views import Picker
 from vision.localisers.making import make_localiser
 from vision.sources import LOCKS, CameraControls, LiveCamera, image_files

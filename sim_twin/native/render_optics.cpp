@@ -1,9 +1,21 @@
 // Lens and pose of the rendered camera, pixel to floor and back.
+#include <algorithm>
 #include <cmath>
 
 #include "render.hpp"
 
 namespace camera {
+namespace {
+
+// The factor by which the lens moves a normalised point away from the axis.
+double radial_factor(const View& view, double r2) {
+  const auto [k1, k2, p1, p2, k3] = view.dist;
+  if (!view.fisheye) return 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  const double r = std::sqrt(std::max(r2, 1e-10)), theta = std::atan(r), t2 = theta * theta;
+  return theta * (1.0 + t2 * (k1 + t2 * (k2 + t2 * k3))) / r;
+}
+
+}  // namespace
 
 void undistort(const View& view, double u, double v, double& x, double& y) {
   const double xd = (u - view.cx) / view.fx, yd = (v - view.cy) / view.fy;
@@ -12,7 +24,7 @@ void undistort(const View& view, double u, double v, double& x, double& y) {
   y = yd;
   for (int i = 0; i < 200; ++i) {
     const double r2 = x * x + y * y;
-    const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+    const double radial = radial_factor(view, r2);
     const double nx = (xd - (2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x))) / radial;
     const double ny = (yd - (p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y)) / radial;
     const double step = std::fabs(nx - x) + std::fabs(ny - y);
@@ -29,7 +41,7 @@ bool project(const View& view, double x, double y, double z, double& u, double& 
   if (c[2] <= 1e-6) return false;
   const double a = c[0] / c[2], b = c[1] / c[2], r2 = a * a + b * b;
   const auto [k1, k2, p1, p2, k3] = view.dist;
-  const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  const double radial = radial_factor(view, r2);
   u = view.cx + view.fx * (a * radial + 2.0 * p1 * a * b + p2 * (r2 + 2.0 * a * a));
   v = view.cy + view.fy * (b * radial + p1 * (r2 + 2.0 * b * b) + 2.0 * p2 * a * b);
   return true;

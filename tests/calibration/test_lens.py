@@ -13,8 +13,9 @@ import pytest
 from hil.core.errors import BadInput
 from tests.calibration.render import LENS, board_image, hand_held
 from vision import cv_compat
+from vision.calibration.advice import advise, coverage
 from vision.calibration.boards import parse_board
-from vision.calibration.intrinsics import advise, calibrate_lens, coverage, slant_deg
+from vision.calibration.intrinsics import calibrate_lens, slant_deg
 
 PHOTOS = sorted((Path(__file__).parent.parent / "data" / "chessboard").glob("left*.jpg"))
 REFERENCE_F_PX = 535.916

@@ -9,13 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hil.core.types import Pose
+from vision.calibration.advice import GRID_COLUMNS, GRID_ROWS, coverage
 from vision.calibration.floor import FloorCalibration
-from vision.calibration.intrinsics import (
-    GRID_COLUMNS,
-    GRID_ROWS,
-    LensCalibration,
-    coverage,
-)
+from vision.calibration.intrinsics import LensCalibration
 from vision.camera import CameraModel
 
 Array = NDArray[np.float64]

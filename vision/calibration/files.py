@@ -126,11 +126,22 @@ def lens_tables(calibration: LensCalibration) -> list[Table]:
             f"{name} shows the board as {like} does: counted once"
             for name, like in calibration.alike
         ],
+        *_kind_comment(calibration),
         f"standard deviation of fx {calibration.sigma[0]:.2f} px, of cx"
         f" {calibration.sigma[2]:.2f} px; image covered {calibration.coverage_ratio:.0%}",
     ]
     lens = dict(zip(LENS_NAMES, map(float, calibration.lens), strict=True))
-    return [Table("", size), Table("lens", {**at_size, **lens}, comments)]
+    return [
+        Table("", size),
+        Table("lens", {**at_size, "fisheye": calibration.fisheye, **lens}, comments),
+    ]
+
+
+def _kind_comment(calibration: LensCalibration) -> list[str]:
+    if not calibration.evidence_px:
+        return []
+    pinhole_px, fisheye_px = calibration.evidence_px
+    return [f"median view, held out: pinhole {pinhole_px:.3f} px, fisheye {fisheye_px:.3f} px"]
 
 
 def floor_tables(result: FloorCalibration, with_lens: bool) -> list[Table]:
@@ -150,7 +161,7 @@ def floor_tables(result: FloorCalibration, with_lens: bool) -> list[Table]:
     size = {"width_px": camera.width_px, "height_px": camera.height_px}
     numbers = (camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, *camera.dist)
     lens: dict[str, Value] = {f"at_{key}": value for key, value in size.items()}
-    lens |= dict(zip(LENS_NAMES, numbers, strict=True))
+    lens |= {"fisheye": camera.fisheye, **dict(zip(LENS_NAMES, numbers, strict=True))}
     if isinstance(camera, CorrectedCamera):
         lens["shift_degree"] = camera.degree
         for axis, name in enumerate(("shift_u", "shift_v")):

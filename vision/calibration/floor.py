@@ -291,7 +291,7 @@ def _project(camera: CameraModel, world_m: Array) -> Array:
     """Return pixels as `project` does, but far away in place of NaN behind the camera."""
     cam = (world_m - camera.t_world_cam_m) @ camera.R_world_cam
     z = np.maximum(cam[:, 2], 1e-3)
-    xd, yd = distort(cam[:, 0] / z, cam[:, 1] / z, camera.dist)
+    xd, yd = distort(cam[:, 0] / z, cam[:, 1] / z, camera.dist, fisheye=camera.fisheye)
     return np.stack((camera.fx_px * xd + camera.cx_px, camera.fy_px * yd + camera.cy_px), axis=1)
 
 

@@ -1,4 +1,7 @@
-"""Lens calibration from views of a board: outlier views dropped by name, hold-out error, coverage."""
+"""Lens calibration from views of a board: outlier views dropped by name, hold-out error, coverage.
+
+Whether the lens is a fisheye is told by evidence: the error on views that it was not fitted to.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,9 @@ from numpy.typing import NDArray
 from hil.core.errors import BadInput
 from hil.core.wording import past
 from vision import cv_compat
+from vision.calibration.advice import Sight, advise, coverage
 from vision.calibration.boards import BoardView
+from vision.calibration.lens_fit import Lens, LensFit, fit_lens
 from vision.calibration.plausible import check_lens
 from vision.camera import CameraModel
 
@@ -28,20 +33,23 @@ HELD_OUT_MAX_PX = 1.0
 REACH_FACTOR = 1.02
 ALONE_CORNERS_RATIO = 0.3
 ALONE_VIEWS_RATIO = 0.1
-# A view is an outlier when its error stands this many robust deviations, and this factor, above
-# the median: near-equal views have a tiny spread, in which plain chance makes "outliers".
+# A view is an outlier when its error under the lens of all others stands this many robust
+# deviations, and this factor, above the median: near-equal views have a tiny spread, in which plain
+# chance makes "outliers". Of many views only those that fit worst are left out to be judged.
 OUTLIER_DEVIATIONS = 4.0
 OUTLIER_FACTOR = 2.0
 DROP_RATIO_MAX = 0.34
-GRID_COLUMNS, GRID_ROWS = 8, 6
-TILT_WANTED_DEG = 20.0
-COVERAGE_WANTED = 0.7
+JUDGED_MAX = 24
+# A fisheye is taken where its error on held-out views is less by this factor and by so many pixels.
+FISHEYE_FACTOR = 1.15
+FISHEYE_GAIN_PX = 0.02
 
 
 @dataclass(frozen=True, slots=True)
 class ViewResult:
     """How well one view fits: RMS residual in px, tilt of the board against the image plane.
 
+    `left_out_px` is the residual under the lens of all other views, by which outliers are told.
     `alone_px` is the RMS on held-out corners without those that this view alone reaches, further
     out than any of the other half; NaN where it is judged by all of its corners.
     """
@@ -53,6 +61,7 @@ class ViewResult:
     tilt_deg: float
     dropped: bool
     alone_px: float = math.nan
+    left_out_px: float = math.nan
 
     @property
     def judged_px(self) -> float:
@@ -64,7 +73,9 @@ class ViewResult:
 class LensCalibration:
     """A lens with what is known about its worth.
 
-    `lens` is (fx, fy, cx, cy, k1, k2, p1, p2, k3) and `sigma` its standard deviations. `held_out_px`
+    `lens` is (fx, fy, cx, cy, k1, k2, p1, p2, k3) and `sigma` its standard deviations, of a fisheye
+    lens or not. `evidence_px` has the median view's error on held-out views for a pinhole and for a
+    fisheye lens, infinite where there is none, empty where it was not asked. `held_out_px`
     is the RMS residual over views the lens was not fitted to, their pose being solved anew.
     `corners_px` and `residuals_px` (seen minus projected) are (N, 2), over all views kept.
     `alike` names views that show the board where another does, with that other one.
@@ -82,42 +93,68 @@ class LensCalibration:
     corners_px: Array
     residuals_px: Array
     alike: tuple[tuple[str, str], ...] = ()
+    fisheye: bool = False
+    evidence_px: tuple[float, ...] = ()
 
     def model(self) -> CameraModel:
         """Return the lens as a camera at the world's origin that looks along world z."""
-        fx, fy, cx, cy, k1, k2, p1, p2, k3 = map(float, self.lens)
-        dist = (k1, k2, p1, p2, k3)
-        size = (self.width_px, self.height_px)
-        return CameraModel(*size, fx, fy, cx, cy, dist, np.eye(3), np.zeros(3))
+        return Lens(self.lens, self.fisheye).camera((self.width_px, self.height_px))
 
 
-def calibrate_lens(views: Sequence[BoardView], size_px: tuple[int, int]) -> LensCalibration:
+def calibrate_lens(
+    views: Sequence[BoardView], size_px: tuple[int, int], kind: str = "auto"
+) -> LensCalibration:
     """Fit the lens to the views, at least 5 that differ; raises BadInput for one not to be believed.
 
+    `kind` is "pinhole", "fisheye", or "auto": what held-out views say.
     Views alike count once, outlier views are dropped one by one. Refused are a lens that no camera
     has, one whose focal length is uncertain, and one that misses views it was not fitted to.
     """
     differing, alike = _differing(views, size_px)
-    kept, dropped, (lens, sigma, errors, places) = _fit_without_outliers(differing, alike, size_px)
-    tilts = [_tilt_deg(place) for place in places]
-    check_lens(lens, sigma, size_px, tilts)
-    results = _results(kept, errors, tilts, size_px)
+    evidence_px = _evidence(differing, size_px) if kind == "auto" else ()
+    fisheye = _says_fisheye(*evidence_px) if evidence_px else kind == "fisheye"
+    kept, dropped, fit, left_out = _fit_without_outliers(differing, alike, size_px, fisheye)
+    tilts = [_tilt_deg(place) for place in fit.places]
+    check_lens(fit.lens.numbers, fit.sigma, size_px, tilts)
+    results = _results(kept, fit, left_out, tilts, size_px)
     held_out_px = _rms(np.array([result.judged_px for result in results]), kept)
     _check_held_out(held_out_px, results)
     covered = coverage([view.px for view in kept], size_px)
+    pairs = list(zip(kept, fit.places, strict=True))
     return LensCalibration(
         *size_px,
-        lens,
-        sigma,
-        _rms(errors, kept),
+        fit.lens.numbers,
+        fit.sigma,
+        _rms(fit.errors, kept),
         held_out_px,
         float(np.mean(covered > 0)),
-        (*results, *(_judge_dropped(view, error, lens) for view, error in dropped)),
-        (*_advise_alone(results), *advise(covered, tilts)),
+        (*results, *(_judge_dropped(*gone, fit.lens) for gone in dropped)),
+        (*_advise_alone(results), *advise(covered, tilts, sights(pairs, size_px))),
         np.vstack([view.px for view in kept]),
-        np.vstack([residuals(v, lens, place) for v, place in zip(kept, places, strict=True)]),
+        np.vstack([fit.lens.residuals(view, place) for view, place in pairs]),
         alike,
+        fisheye,
+        evidence_px,
     )
+
+
+def _evidence(views: Sequence[BoardView], size_px: tuple[int, int]) -> tuple[float, ...]:
+    """Return the median view's error under the other half's lens, px: pinhole, then fisheye."""
+    if len(views) < 2 * VIEWS_MIN:
+        return ()
+    found = []
+    for fisheye in (False, True):
+        try:
+            found.append(float(np.median(_held_out(views, size_px, fisheye)[0])))
+        except BadInput:
+            found.append(math.inf)
+    return tuple(found)
+
+
+def _says_fisheye(pinhole_px: float, fisheye_px: float) -> bool:
+    if not math.isfinite(pinhole_px):
+        return math.isfinite(fisheye_px)
+    return fisheye_px * FISHEYE_FACTOR < pinhole_px and pinhole_px - fisheye_px > FISHEYE_GAIN_PX
 
 
 def _differing(
@@ -147,15 +184,18 @@ def distance_px(a: BoardView, b: BoardView) -> float:
     return float(np.sqrt(np.mean(np.sum(np.square(pairs), axis=1)))) if pairs else float("inf")
 
 
-Fit = tuple[Array, Array, Array, Array]
+Dropped = tuple[BoardView, float, float]  # with its errors in the fit and left out of it, px
 
 
 def _fit_without_outliers(
-    views: list[BoardView], alike: tuple[tuple[str, str], ...], size_px: tuple[int, int]
-) -> tuple[list[BoardView], list[tuple[BoardView, float]], Fit]:
-    """Return the views kept, those dropped with their error in px, and the fit."""
+    views: list[BoardView],
+    alike: tuple[tuple[str, str], ...],
+    size_px: tuple[int, int],
+    fisheye: bool,
+) -> tuple[list[BoardView], list[Dropped], LensFit, Array]:
+    """Return the views kept, those dropped, the fit, and the errors of kept views left out of it."""
     kept = list(views)
-    dropped: list[tuple[BoardView, float]] = []
+    dropped: list[Dropped] = []
     while True:
         if len(kept) < VIEWS_MIN:
             same = f" ({len(alike)} more show it in the same places)" if alike else ""
@@ -163,26 +203,54 @@ def _fit_without_outliers(
                 f"lens: {len(kept)} usable views of the board that differ{same}, at least {VIEWS_MIN}"
                 " are needed; add views from other sides and tilts"
             )
-        fit = _fit(kept, size_px)
-        errors = fit[2]
-        worst = int(np.argmax(errors))
-        if not _is_outlier(errors, worst):
-            return kept, dropped, fit
-        dropped.append((kept.pop(worst), float(errors[worst])))
+        fit = fit_lens(kept, size_px, fisheye=fisheye)
+        left_out, rest_px = _left_out(kept, fit, size_px)
+        outliers = [k for k in range(len(kept)) if _is_outlier(left_out, k)]
+        if not outliers:
+            return kept, dropped, fit, left_out
+        # One bad view sets good ones apart too: the one without which the others agree best is it.
+        worst = min(outliers, key=lambda k: (rest_px[k], -left_out[k]))
+        dropped.append((kept.pop(worst), float(fit.errors[worst]), float(left_out[worst])))
         if len(dropped) > DROP_RATIO_MAX * len(views):
-            names = ", ".join(view.name for view, _ in dropped)
+            names = ", ".join(gone[0].name for gone in dropped)
             raise BadInput(
                 f"lens: {len(dropped)} of {len(views)} views do not agree with the rest ({names});"
                 " is the board flat, and its size as said?"
             )
 
 
-def _fit(views: Sequence[BoardView], size_px: tuple[int, int]) -> Fit:
-    try:
-        return cv_compat.calibrate([v.board_m for v in views], [v.px for v in views], size_px)
-    except cv_compat.CvError as error:
-        text = str(error).split("error:")[-1].split("\n")[0].strip()
-        raise BadInput(f"lens: the views do not determine one ({text}); tilt the board") from None
+def _left_out(
+    views: Sequence[BoardView], fit: LensFit, size_px: tuple[int, int]
+) -> tuple[Array, Array]:
+    """Return each view's RMS residual under the lens of all others, px, in their reach.
+
+    The second has the RMS residual of the others among themselves, infinite where not known.
+    A view that is off pulls the lens to itself and so hides in the fit's own residuals.
+    """
+    errors, rest_px = fit.errors.copy(), np.full(len(views), math.inf)
+    if len(views) <= VIEWS_MIN:
+        return errors, rest_px
+    for k in np.argsort(-errors)[:JUDGED_MAX]:
+        others = [*views[:k], *views[k + 1 :]]
+        try:
+            start = fit.lens, np.delete(fit.places, k, axis=0)
+            without = fit_lens(others, size_px, fisheye=fit.lens.fisheye, start=start)
+        except BadInput:  # the others alone determine none: the view is judged in the fit
+            continue
+        lens, rest_px[k] = without.lens, _rms(without.errors, others)
+        inside = _out_px(views[k], lens) <= _reach_px(others, lens)
+        if np.mean(~inside) <= ALONE_CORNERS_RATIO:
+            errors[k] = lens.error_px(_part(views[k], inside))
+    return errors, rest_px
+
+
+def _reach_px(views: Sequence[BoardView], lens: Lens) -> float:
+    """Return how far from the centre a lens fitted to views is not extrapolated."""
+    return REACH_FACTOR * max(float(_out_px(view, lens).max()) for view in views)
+
+
+def _part(view: BoardView, corners: NDArray[np.bool_]) -> BoardView:
+    return replace(view, board_m=view.board_m[corners], px=view.px[corners])
 
 
 def _is_outlier(errors: Array, index: int) -> bool:
@@ -193,17 +261,21 @@ def _is_outlier(errors: Array, index: int) -> bool:
 
 
 def _results(
-    kept: list[BoardView], errors: Array, tilts: Sequence[float], size_px: tuple[int, int]
+    kept: list[BoardView],
+    fit: LensFit,
+    left_out: Array,
+    tilts: Sequence[float],
+    size_px: tuple[int, int],
 ) -> list[ViewResult]:
     """Return each view's figures; where the hold-out fails, without corners one view alone reaches."""
-    held_out, alone = _held_out(kept, size_px)
+    held_out, alone = _held_out(kept, size_px, fit.lens.fisheye)
     enough = _rms(np.array(held_out), kept) <= HELD_OUT_MAX_PX
     if enough or np.sum(np.isfinite(alone)) > max(1.0, ALONE_VIEWS_RATIO * len(kept)):
         alone = [math.nan] * len(kept)
-    rows = zip(kept, errors, held_out, tilts, alone, strict=True)
+    rows = zip(kept, fit.errors, held_out, tilts, alone, left_out, strict=True)
     return [
-        ViewResult(view.name, len(view.px), float(error), held, tilt, False, out)
-        for view, error, held, tilt, out in rows
+        ViewResult(view.name, len(view.px), float(error), held, tilt, False, out, float(left))
+        for view, error, held, tilt, out, left in rows
     ]
 
 
@@ -236,7 +308,7 @@ def _advise_alone(results: Sequence[ViewResult]) -> list[str]:
 
 
 def _held_out(
-    views: Sequence[BoardView], size_px: tuple[int, int]
+    views: Sequence[BoardView], size_px: tuple[int, int], fisheye: bool
 ) -> tuple[list[float], list[float]]:
     """Return each view's RMS residual in px under a lens fitted to the other half of the views.
 
@@ -246,38 +318,42 @@ def _held_out(
     errors, alone = [math.nan] * len(views), [math.nan] * len(views)
     for fold in (0, 1):
         train = [view for k, view in enumerate(views) if k % 2 != fold]
-        lens = _fit(train, size_px)[0]
-        reach_px = REACH_FACTOR * max(_out_px(view, lens).max() for view in train)
+        lens = fit_lens(train, size_px, fisheye=fisheye).lens
+        reach_px = _reach_px(train, lens)
         for k in range(fold, len(views), 2):
-            errors[k] = _view_error(views[k], lens)
+            errors[k] = lens.error_px(views[k])
             inside = _out_px(views[k], lens) <= reach_px
             if 0.0 < np.mean(~inside) <= ALONE_CORNERS_RATIO:
-                part = replace(views[k], board_m=views[k].board_m[inside], px=views[k].px[inside])
-                alone[k] = _view_error(part, lens)
+                alone[k] = lens.error_px(_part(views[k], inside))
     return errors, alone
 
 
-def _out_px(view: BoardView, lens: Array) -> Array:
+def _out_px(view: BoardView, lens: Lens) -> Array:
     """Return how far a view's corners lie from the lens's centre."""
-    return np.asarray(np.linalg.norm(view.px - lens[2:4], axis=1))
+    return np.asarray(np.linalg.norm(view.px - lens.numbers[2:4], axis=1))
 
 
-def _view_error(view: BoardView, lens: Array) -> float:
-    place = cv_compat.board_place(lens, view.board_m, view.px)
-    return float(np.sqrt(np.mean(np.sum(residuals(view, lens, place) ** 2, axis=1))))
+def off_lens_px(others: Sequence[BoardView], view: BoardView, size_px: tuple[int, int]) -> float:
+    """Return a view's RMS residual in px under the lens of other views; raises BadInput for few."""
+    if len(others) < VIEWS_MIN:
+        raise BadInput(
+            f"lens: {view.name} is turned by 90 deg against {len(others)} others, at least"
+            f" {VIEWS_MIN} are needed to see which way; turn all of them alike"
+        )
+    return fit_lens(others, size_px).lens.error_px(view)
 
 
-def residuals(view: BoardView, lens: Array, place: Array) -> Array:
-    """Return seen minus projected corners, (N, 2), px."""
-    difference: Array = view.px - cv_compat.project(lens, place, view.board_m)
-    return difference
-
-
-def _judge_dropped(view: BoardView, error_px: float, lens: Array) -> ViewResult:
-    place = cv_compat.board_place(lens, view.board_m, view.px)
-    held_out_px = _view_error(view, lens)
+def _judge_dropped(view: BoardView, error_px: float, left_out_px: float, lens: Lens) -> ViewResult:
+    tilt_deg = _tilt_deg(lens.place(view))
+    held_out_px = lens.error_px(view)
     return ViewResult(
-        view.name, len(view.px), error_px, held_out_px, _tilt_deg(place), dropped=True
+        view.name,
+        len(view.px),
+        error_px,
+        held_out_px,
+        tilt_deg,
+        dropped=True,
+        left_out_px=left_out_px,
     )
 
 
@@ -298,38 +374,18 @@ def slant_deg(view: BoardView) -> float:
     return float(np.degrees(np.arccos(min(1.0, short / long))))
 
 
+def sights(pairs: Sequence[tuple[BoardView, Array]], size_px: tuple[int, int]) -> list[Sight]:
+    """Return what each view, with its board's place, says: tilt, distance, how far out it reaches."""
+    half_px = 0.5 * np.array(size_px, dtype=np.float64)
+    found = []
+    for view, place in pairs:
+        middle = cv_compat.rotation(place[:3]) @ view.board_m.mean(axis=0) + place[3:]
+        reach = float(np.max(np.abs(view.px - half_px) / half_px))
+        found.append(Sight(view.name, _tilt_deg(place), float(middle[2]), reach))
+    return found
+
+
 def _rms(errors: Array, views: Sequence[BoardView]) -> float:
     """Return the RMS over all corners of per-view RMS errors."""
     weights = np.array([len(view.px) for view in views], dtype=np.float64)
     return float(np.sqrt(np.average(np.square(errors), weights=weights)))
-
-
-def coverage(corners_px: Sequence[Array], size_px: tuple[int, int]) -> NDArray[np.int64]:
-    """Return how many corners fell into each of 6 x 8 cells of the image, (rows, columns)."""
-    every = np.vstack([*corners_px, np.empty((0, 2))])
-    edges_v = np.linspace(-0.5, size_px[1] - 0.5, GRID_ROWS + 1)
-    edges_u = np.linspace(-0.5, size_px[0] - 0.5, GRID_COLUMNS + 1)
-    counts, _, _ = np.histogram2d(every[:, 1], every[:, 0], bins=(edges_v, edges_u))
-    return counts.astype(np.int64)
-
-
-def advise(covered: NDArray[np.int64], tilts_deg: Sequence[float]) -> list[str]:
-    """Return what to show the camera next, most useful first; empty when the views suffice."""
-    advice = []
-    empty = covered == 0
-    if np.mean(~empty) < COVERAGE_WANTED:
-        thirds = {"upper": slice(0, 2), "middle": slice(2, 4), "lower": slice(4, 6)}
-        sides = {"left": slice(0, 3), "centre": slice(3, 5), "right": slice(5, 8)}
-        share = {
-            f"{down} {across}": float(np.mean(empty[rows, columns]))
-            for down, rows in thirds.items()
-            for across, columns in sides.items()
-        }
-        bare = sorted((name for name in share if share[name] > 0.5), key=lambda n: -share[n])
-        advice.append(f"hold the board to the {', '.join(bare[:3]) or 'edges'} of the image")
-    tilted = sum(tilt > TILT_WANTED_DEG for tilt in tilts_deg)
-    if tilted < 3:
-        advice.append(f"tilt the board by 20 to 40 deg ({tilted} of 3 such views)")
-    if len(tilts_deg) < 10:
-        advice.append(f"take {10 - len(tilts_deg)} more views (10 make the error figures stable)")
-    return advice

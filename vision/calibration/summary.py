@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+import statistics
 from pathlib import Path
 from typing import Any
 
 from vision.calibration.floor import FloorCalibration, error_budget
 from vision.calibration.intrinsics import LensCalibration
 from vision.calibration.plausible import LENS_NAMES
+from vision.calibration.views import Views
 
 HEIGHT_ADVICE = (
     "focal length and camera height cannot be told apart from floor points: give --camera-height,"
@@ -16,50 +18,71 @@ HEIGHT_ADVICE = (
 )
 
 
-def lens_document(result: LensCalibration, missed: Sequence[str], file: Path) -> dict[str, Any]:
-    """Return the figures of a lens calibration; `missed` names images without the board."""
+def lens_document(result: LensCalibration, views: Views, file: Path) -> dict[str, Any]:
+    """Return the figures of a lens calibration, with what the images gave and did not."""
     return {
         "camera_file": str(file),
         "width_px": result.width_px,
         "height_px": result.height_px,
         "lens": dict(zip(LENS_NAMES, map(float, result.lens), strict=True)),
+        "fisheye": result.fisheye,
+        "evidence_px": dict(zip(("pinhole", "fisheye"), result.evidence_px, strict=False)),
         "sigma": dict(zip(LENS_NAMES, map(float, result.sigma), strict=True)),
         "error_px": result.error_px,
         "held_out_px": result.held_out_px,
         "coverage_ratio": result.coverage_ratio,
         "views": [
             {"name": v.name, "corners": v.corners, "error_px": v.error_px,
-             "held_out_px": v.held_out_px, "tilt_deg": v.tilt_deg, "dropped": v.dropped}
+             "held_out_px": v.held_out_px, "left_out_px": v.left_out_px,
+             "tilt_deg": v.tilt_deg, "dropped": v.dropped}
             for v in result.views
         ],
         "alike": [{"name": name, "like": like} for name, like in result.alike],
-        "not_seen": list(missed),
+        "not_seen": views.missed,
+        "brought_to_one_size": views.brought,
         "advice": list(result.advice),
     }  # fmt: skip
 
 
-def lens_text(result: LensCalibration, missed: Sequence[str], file: Path) -> str:
+def lens_text(result: LensCalibration, views: Views, file: Path) -> str:
     """Return the lens calibration as lines."""
     fx, fy, cx, cy = result.lens[:4]
+    kind = "fisheye" if result.fisheye else "pinhole"
     lines = [
-        f"lens at {result.width_px} x {result.height_px} px: focal length {fx:.2f} x {fy:.2f} px"
+        f"{kind} lens at {result.width_px} x {result.height_px} px: focal length"
+        f" {fx:.2f} x {fy:.2f} px"
         f" (sigma {result.sigma[0]:.2f}, {result.sigma[0] / fx:.1%}), centre ({cx:.2f}, {cy:.2f}) px",
         "distortion k1 k2 p1 p2 k3: " + " ".join(f"{k:.5f}" for k in result.lens[4:]),
         f"residual {result.error_px:.3f} px RMS, on held-out views {result.held_out_px:.3f} px RMS;"
         f" image covered {result.coverage_ratio:.0%}",
     ]
+    if result.evidence_px:
+        pinhole, fisheye = (
+            f"{px:.3f} px" if math.isfinite(px) else "none" for px in result.evidence_px
+        )
+        lines.append(
+            f"kind of lens by the median held-out view: pinhole {pinhole}, fisheye {fisheye}"
+        )
+    usual_px = _usual_px(result)
     lines += [
-        f"dropped {v.name}: {v.error_px:.2f} px where the others have {result.error_px:.2f} px"
+        f"dropped {v.name}: {v.left_out_px:.2f} px off the lens of all others, where they have"
+        f" {usual_px:.2f} px"
         for v in result.views
         if v.dropped
     ]
     if result.alike:
         names = ", ".join(f"{name} (as {like})" for name, like in result.alike)
         lines.append(f"counted once, the board in the same place: {names}")
-    if missed:
-        lines.append(f"board not seen in {', '.join(missed)}")
+    if views.missed:
+        lines.append(f"board not seen in {', '.join(views.missed)}")
+    lines += views.brought
     lines += [f"to make it better: {advice}" for advice in result.advice]
     return "\n".join([*lines, f"written to {file}; next: hil calibrate floor"])
+
+
+def _usual_px(result: LensCalibration) -> float:
+    """Return the median view's error under the lens of all others, px."""
+    return statistics.median(v.left_out_px for v in result.views if not v.dropped)
 
 
 def floor_document(result: FloorCalibration, height_m: float, file: Path) -> dict[str, Any]:

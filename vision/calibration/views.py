@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 
 from hil.core.errors import BadInput
 from vision import cv_compat
+from vision.calibration.advice import advise, coverage
 from vision.calibration.boards import Board, BoardView, not_seen_hint
-from vision.calibration.intrinsics import advise, coverage, distance_px, slant_deg
-from vision.sources import ImageFolder, LiveCamera, VideoFile
+from vision.calibration.intrinsics import distance_px, off_lens_px, slant_deg
+from vision.calibration.one_size import SizedView, at_one_size
+from vision.sources import ImageFolder, LiveCamera, VideoFile, image_files
 
 Image = NDArray[np.uint8]
 Report = Callable[[str], None]
@@ -33,7 +35,7 @@ class Views:
     """Views of one board at one image size; `missed` names images in which it was not seen.
 
     `faults` has why what was seen in an image is not the board, `looked` the images looked at and
-    `where` names them: "12 images of DIR".
+    `where` names them: "12 images of DIR". `brought` says which were scaled or turned to the size.
     """
 
     size_px: tuple[int, int]
@@ -43,6 +45,7 @@ class Views:
     looked: int = 0
     where: str = ""
     hint: str = ""
+    brought: list[str] = field(default_factory=list)
 
     def look_for_other(self, board: Board, image: Image) -> None:
         """Keep what is seen in place of the board, as long as nothing else was."""
@@ -77,25 +80,30 @@ class Views:
 
 
 def views_of_folder(board: Board, folder: Path, report: Report) -> Views:
-    """Return a view of every image of the folder that shows the board; raises BadInput."""
-    source = ImageFolder(folder)
-    found = Views((source.width_px, source.height_px))
-    for frame in source.frames():
-        name = source.files[frame.index].name
-        assert frame.image is not None
-        seen = board.find(frame.image, name)
-        if seen is None:
-            found.look_for_other(board, frame.image)
+    """Return a view of every image of the folder that shows the board; raises BadInput.
+
+    Images of one sensor in several sizes, or turned by 90 degrees, are brought to one size.
+    """
+    found = Views((0, 0))
+    sized: list[SizedView] = []
+    for file in image_files(folder):
+        image = cv_compat.read_image(file)
+        seen = board.find(image, file.name)
+        if seen is None and not sized:
+            found.look_for_other(board, image)
         view = found.sound(seen)
         if view is not None:
-            report(f"{name}: {len(view.px)} corners")
-            found.views.append(view)
+            report(f"{file.name}: {len(view.px)} corners")
+            sized.append(SizedView(view, image.shape[1::-1]))
         else:
-            report(
-                f"{name}: {'board not seen' if seen is None else f'not this board: {seen.fault}'}"
-            )
-            found.missed.append(name)
+            what = "board not seen" if seen is None else f"not this board: {seen.fault}"
+            report(f"{file.name}: {what}")
+            found.missed.append(file.name)
     found.where = f"{found.looked} images of {folder}"
+    if sized:
+        same = at_one_size(sized, off_lens_px)
+        found.size_px, found.views = same.size_px, same.views
+        found.brought = [*same.scaled, *same.turned]
     return found.require(1)
 
 

@@ -158,10 +158,9 @@ NB_MODULE(_marks, m) {
       .def(
           "__init__",
           [](Camera* self, const std::array<double, 4>& lens, const std::array<double, 5>& distortion,
-             const std::array<double, 9>& rotation, const std::array<double, 3>& centre_m) {
-            new (self) Camera{lens, distortion, rotation, centre_m};
-          },
-          "lens"_a, "distortion"_a, "rotation"_a, "centre_m"_a);
+             const std::array<double, 9>& rotation, const std::array<double, 3>& centre_m,
+             bool fisheye) { new (self) Camera{lens, distortion, rotation, centre_m, fisheye}; },
+          "lens"_a, "distortion"_a, "rotation"_a, "centre_m"_a, "fisheye"_a = false);
   bind_rims(m);
   bind_search(m);
 }

@@ -1,5 +1,6 @@
 #include "camera.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -8,14 +9,25 @@ namespace {
 
 constexpr int kNewtonSteps = 20;
 constexpr double kNewtonTolerance = 1e-13;
+constexpr double kSmallR2 = 1e-10;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
 
+Camera::Radial Camera::fisheye_radial(double r2) const {
+  const auto& [k1, k2, p1, p2, k3] = distortion;
+  const double r = std::sqrt(std::max(r2, kSmallR2));
+  const double theta = std::atan(r);
+  const double t2 = theta * theta;
+  const double factor = theta * (1.0 + t2 * (k1 + t2 * (k2 + t2 * k3))) / r;
+  const double rise = (1.0 + t2 * (3.0 * k1 + t2 * (5.0 * k2 + t2 * 7.0 * k3))) / (1.0 + r * r);
+  return {factor, (rise - factor) / (r * r)};
+}
+
 Vec2 Camera::distort(Vec2 at) const {
   const auto& [k1, k2, p1, p2, k3] = distortion;
   const double r2 = at.x * at.x + at.y * at.y;
-  const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  const double radial = fisheye ? fisheye_radial(r2).factor : 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
   const double xy2 = 2.0 * at.x * at.y;
   return {at.x * radial + p1 * xy2 + p2 * (r2 + 2.0 * at.x * at.x),
           at.y * radial + p1 * (r2 + 2.0 * at.y * at.y) + p2 * xy2};
@@ -42,8 +54,10 @@ Vec2 Camera::normalise(Vec2 px) const {
   for (int step = 0; step < kNewtonSteps; ++step) {
     const Vec2 rest = target - distort(at);
     const double r2 = at.x * at.x + at.y * at.y;
-    const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-    const double slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3));
+    const Radial bend =
+        fisheye ? fisheye_radial(r2)
+                : Radial{1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)), 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))};
+    const auto [radial, slope] = bend;
     const double cross = at.x * at.y * slope + 2.0 * p1 * at.x + 2.0 * p2 * at.y;
     const double xx = radial + at.x * at.x * slope + 2.0 * p1 * at.y + 6.0 * p2 * at.x;
     const double yy = radial + at.y * at.y * slope + 6.0 * p1 * at.y + 2.0 * p2 * at.x;

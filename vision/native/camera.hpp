@@ -21,6 +21,7 @@ struct Camera {
   std::array<double, 5> distortion;  // k1, k2, p1, p2, k3
   std::array<double, 9> rotation;    // R_world_cam, row by row
   std::array<double, 3> centre_m;    // t_world_cam
+  bool fisheye = false;              // radial terms of the angle from the axis
 
   // The pixel of a world point.
   Vec2 project(Vec2 point_m, double z_m) const;
@@ -28,6 +29,11 @@ struct Camera {
   Vec2 floor_point(Vec2 px, double height_m) const;
 
  private:
+  struct Radial {
+    double factor;
+    double slope;  // (d factor / dr) / r
+  };
+  Radial fisheye_radial(double r2) const;
   Vec2 distort(Vec2 at) const;
   Vec2 normalise(Vec2 px) const;
 };
