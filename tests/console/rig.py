@@ -195,7 +195,7 @@ def film(path: Path, pictures: Sequence[Any], each: int = 10) -> None:
     out.release()
 
 
-def began_bring_up(page: Any, tries: int = 6) -> bool:
+def began_bring_up(page: Any, tries: int = 12) -> bool:
     """Begin a bring-up and see its first question; False where this machine is too busy for its link."""
     for _ in range(tries):
         page.check("#b-ready")
