@@ -2,6 +2,7 @@
 import { ask, byId, command, el, fill, number, when, who } from "./core.js";
 
 let state = { on: false };
+const FREE = "ALL wheels are off the ground; they will turn, up to full speed";
 const SEEN = [["left forward", "Left, forward"], ["left backward", "Left, backward"], ["right forward", "Right, forward"], ["right backward", "Right, backward"], ["none", "None turned"], ["?", "Nobody looked"]];
 
 export function make() {
@@ -12,7 +13,7 @@ export function make() {
       el("div", {}, el("label", { for: "b-robot" }, "Robot as believed"), el("select", { id: "b-robot" })),
       el("div", {}, el("label", { for: "b-turns" }, "Turns to count"), el("input", { id: "b-turns", type: "number", min: 0, max: 100, value: 10 }))),
     el("label", { class: "check" }, el("input", { type: "checkbox", id: "b-floor", on: { change: ready } }), "It stands on its floor: measure whether it turns there, and nothing else"),
-    el("label", { class: "check" }, el("input", { type: "checkbox", id: "b-ready", on: { change: told } }), el("span", { id: "b-ready-said" })),
+    el("label", { class: "check" }, el("input", { type: "checkbox", id: "b-ready", on: { change: told } }), el("span", { id: "b-ready-said" }, FREE)),
     el("button", { id: "b-begin", type: "button", class: "main", on: { click: begin } }, "Begin"),
     el("div", { id: "b-live", hidden: true },
       el("div", { class: "two" },
@@ -32,7 +33,7 @@ export async function refresh() {
 
 function ready() {
   byId("b-ready").checked = false;
-  byId("b-ready-said").textContent = byId("b-floor").checked ? "Half a metre around the robot is free; it will turn on the spot, up to full duty" : "ALL wheels are off the ground; they will turn, up to full speed";
+  byId("b-ready-said").textContent = byId("b-floor").checked ? "Half a metre around the robot is free; it will turn on the spot, up to full duty" : FREE;
   told();
 }
 
