@@ -114,10 +114,10 @@ FRAME_COLUMNS = (
     Column("cov_yy_m2", "m^2", "pose", "variance claimed for y"),
     Column("cov_yt_m_rad", "m rad", "pose", "covariance claimed for y and theta"),
     Column("cov_tt_rad2", "rad^2", "pose", "variance claimed for theta"),
-    Column("front_u_px", "px", "marks", "front mark, image column"),
-    Column("front_v_px", "px", "marks", "front mark, image row"),
-    Column("rear_u_px", "px", "marks", "rear mark, image column"),
-    Column("rear_v_px", "px", "marks", "rear mark, image row"),
+    Column("front_u_px", "px", "marks", "front mark (of a tag: its edge), image column"),
+    Column("front_v_px", "px", "marks", "front mark (of a tag: its edge), image row"),
+    Column("rear_u_px", "px", "marks", "rear mark (of a tag: its edge), image column"),
+    Column("rear_v_px", "px", "marks", "rear mark (of a tag: its edge), image row"),
 )
 
 # Columns that records made before them do not have: not known there.

@@ -57,6 +57,19 @@ def test_poses_at_720p_are_good_to_a_tenth_of_a_millimetre():
     assert np.degrees(np.sqrt(np.mean(off[:, 2] ** 2))) < 0.1
 
 
+def test_what_is_shown_of_a_tag_are_its_edges_ahead_and_behind():
+    """Front and rear lie a tag's side apart in the image, the front one where the robot heads."""
+    camera, localiser, config = rig()
+    x, y, theta = 0.2, -0.1, 0.7
+    seen = localiser.locate(frame(camera, 0, (x, y, theta)), Pose(x, y, theta), RADIUS_M)
+    model, height_m = camera_model(config), config.marks.height_m
+    half_m = 0.5 * seen.details["side_m"]
+    for name, way in (("front", half_m), ("rear", -half_m)):
+        place = (x + way * math.cos(theta), y + way * math.sin(theta))
+        u, v = model.project_point(*place, height_m)
+        assert math.hypot(seen.details[f"{name}_u_px"] - u, seen.details[f"{name}_v_px"] - v) < 1.0
+
+
 def test_a_tag_beside_the_centre_of_mass_is_taken_back_to_it():
     """Mounted 30 mm forward and 20 mm left, the pose is still that of the centre of mass."""
     camera, localiser, _ = rig(x_m=0.03, y_m=0.02, size_m=0.05)

@@ -90,7 +90,8 @@ def test_a_run_by_keyboard_alone(console, open_page):
     expect(page.locator("#start")).to_be_enabled()
     tab_to("start")
     page.keyboard.press("Enter")
-    expect(page.locator("#phase")).to_have_text("running")  # of the run before, too, events are there
+    # Events of the run before are there already.
+    expect(page.locator("#phase")).to_have_text("running")
     page.keyboard.press("Space")
     expect(page.locator("#outcome")).to_contain_text("Stopped.")
     assert reached.index("stop") < reached.index("scenario")

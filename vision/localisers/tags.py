@@ -273,12 +273,23 @@ class TagLocaliser:
             "contrast_dn": outline.contrast_dn,
             "side_m": outline.side_m,
             "points": float(outline.points),
-        }
+        } | self._edges(outline, pose)
         sigma_xy_m, sigma_theta_rad = self._sigmas(outline, scale)
         quality = min(1.0, outline.contrast_dn / QUALITY_CONTRAST_DN) * math.exp(
             -((residual_px / QUALITY_RESIDUAL_PX) ** 2)
         )
         return PoseMeasurement(pose, quality, "", sigma_xy_m, sigma_theta_rad, details)
+
+    def _edges(self, outline: _Outline, pose: Pose) -> dict[str, float]:
+        """Return where the middles of the edges towards the robot's front and rear lie in the image, px."""
+        found = {}
+        for name, way in (("front", 0.5), ("rear", -0.5)):
+            ahead_m = way * outline.side_m
+            x_m = outline.pose.x_m + ahead_m * math.cos(pose.theta_rad)
+            y_m = outline.pose.y_m + ahead_m * math.sin(pose.theta_rad)
+            u, v = self._camera.project_point(x_m, y_m, self._height_m)
+            found |= {f"{name}_u_px": float(u), f"{name}_v_px": float(v)}
+        return found
 
     def _sigmas(self, outline: _Outline, scale_m_px: float) -> tuple[float, float]:
         """Return the standard deviations of place and heading.
