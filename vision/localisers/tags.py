@@ -282,13 +282,13 @@ class TagLocaliser:
 
     def _edges(self, outline: _Outline, pose: Pose) -> dict[str, float]:
         """Return where the middles of the edges towards the robot's front and rear lie in the image, px."""
-        found = {}
+        found: dict[str, float] = {}
         for name, way in (("front", 0.5), ("rear", -0.5)):
             ahead_m = way * outline.side_m
             x_m = outline.pose.x_m + ahead_m * math.cos(pose.theta_rad)
             y_m = outline.pose.y_m + ahead_m * math.sin(pose.theta_rad)
             u, v = self._camera.project_point(x_m, y_m, self._height_m)
-            found |= {f"{name}_u_px": float(u), f"{name}_v_px": float(v)}
+            found |= {f"{name}_u_px": u, f"{name}_v_px": v}
         return found
 
     def _sigmas(self, outline: _Outline, scale_m_px: float) -> tuple[float, float]:
