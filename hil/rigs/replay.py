@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from hil.record.source import Source
 
 END = "replay: the record ends here"
-HELD = "operator"  # kind of the events of a robot that is kept at rest until somebody arms it
+# Kind and text of the event of a robot that is kept at rest until somebody arms it.
+HELD = ("operator", "robot found; it is armed by hand")
 # What happened in a record, and what was asked there.
 HAPPENED = ("duration_s", "start", "mismatch", "disturbances", "faults")
 _TASK = ("name", "reference", *HAPPENED)
@@ -235,7 +236,9 @@ def open_replay(source: Source, recorded: Scenario) -> ReplayRig:
         source.tape,
         recorded_frames(source.frames, images),
         recorded_truths(source.samples, true_robot(recorded).d0_m),
-        was_held=any(event.kind == HELD for event in read_events(source.path / layout.EVENTS)),
+        was_held=any(
+            (event.kind, event.text) == HELD for event in read_events(source.path / layout.EVENTS)
+        ),
     )
 
 

@@ -24,6 +24,7 @@ from hil.control.laws.stages import StartGains
 from hil.core.errors import BadInput, RigFault
 from hil.core.registries import OUTER_LAWS
 from hil.core.text import visible
+from hil.rigs.replay import HELD
 from hil.wire import handshake
 
 if TYPE_CHECKING:
@@ -249,7 +250,7 @@ class OperatorOrders:
         now_s = self._link.t_s
         if self._held_since_s is None:
             self._held_since_s, self.holding = now_s, True
-            self._note("operator", "robot found; it is armed by hand")
+            self._note(*HELD)
         if any(order.get("arm") is True for order in self._take()):
             self._held = self.holding = False
             self._note("operator", "armed by hand")

@@ -90,8 +90,9 @@ def test_a_run_by_keyboard_alone(console, open_page):
     expect(page.locator("#start")).to_be_enabled()
     tab_to("start")
     page.keyboard.press("Enter")
-    # Events of the run before are there already.
+    # Events of the run before are there until this one begins.
     expect(page.locator("#phase")).to_have_text("running")
+    expect(page.locator("#events")).to_contain_text("board: armed")
     page.keyboard.press("Space")
     expect(page.locator("#outcome")).to_contain_text("Stopped.")
     assert reached.index("stop") < reached.index("scenario")
