@@ -164,7 +164,7 @@ class Mine:
         return self._inner.estimate_at(t_s)
     def on_pose(self, t_s, measurement):
         self._seen += 1
-        if self._seen > 40:
+        if self._seen > 90:
             raise ZeroDivisionError("by my own hand")
         return self._inner.on_pose(t_s, measurement)
 

@@ -133,13 +133,13 @@ def test_a_host_notices_the_full_port_and_its_stop_acts_at_once(tmp_path):
 
         with pytest.raises(RigFault, match="port is full"):
             flood()
-        seen_safe = link.state == SAFE
+        seen_safe = link.native.state == SAFE
         asked_s = rig.now_s()
         link.stop_now(asked_s)
-        while link.state != SAFE and rig.now_s() < asked_s + 10.0:
+        while link.native.state != SAFE and rig.now_s() < asked_s + 10.0:
             rig.wait(rig.now_s() + 0.01)
             link.poll(rig.now_s())
-        assert link.state == SAFE
+        assert link.native.state == SAFE
         assert not seen_safe
         rig.close()
 
