@@ -6,12 +6,12 @@ import asyncio
 import json
 import os
 import signal
-import sys
 from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from hil.config.load import builtin_names
+from hil.console.child import begin, ordered, tell
 from hil.core.errors import BadInput
 from hil.rigs.opening import is_simulated
 
@@ -62,11 +62,7 @@ class BringUps:
 
     async def start(self, tree: object) -> None:
         """Begin; raises BadInput where one is on, and where nobody says that the robot stands as it must."""
-        try:
-            order = BringUpOrder.model_validate(tree)
-        except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            raise BadInput(f"bring-up: {first['loc'][0]}: {first['msg']}") from None
+        order = ordered(BringUpOrder, tree, "bring-up")
         if self.busy:
             raise BadInput("a bring-up is on: finish it, or STOP it")
         if is_simulated(order.target) or not order.target.startswith("serial:"):
@@ -82,12 +78,9 @@ class BringUps:
         if robot not in builtin_names("robots"):
             robot = str(self._folders.work_file(robot, ".toml"))
         self._state = {"checks": [], "ask": None, "floor": order.floor, "driving": ""}
-        self._process = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", "hil.console.bringup_worker", cwd=self._folders.work,
-            stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, start_new_session=True,
-        )  # fmt: skip
+        self._process = await begin("hil.console.bringup_worker", self._folders.work)
         out = str(self._folders.set_up / ROBOT_FILE)
-        self._write(order.model_dump() | {"robot": robot, "out": out})
+        tell(self._process, order.model_dump() | {"robot": robot, "out": out})
         task = asyncio.get_running_loop().create_task(self._follow(self._process))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
@@ -100,7 +93,7 @@ class BringUps:
         if not isinstance(value, str | int | float) or (isinstance(value, str) and len(value) > 40):
             raise BadInput("bring-up: no answer to what was asked")
         self._state["ask"] = None
-        self._write(value)
+        tell(self._process, value)
         self._tell()
 
     def stop(self) -> None:
@@ -113,10 +106,6 @@ class BringUps:
         self.stop()
         for task in list(self._tasks):
             await asyncio.wait([task], timeout=15.0)
-
-    def _write(self, tree: object) -> None:
-        if self._process is not None and self._process.stdin is not None:
-            self._process.stdin.write(json.dumps(tree).encode() + b"\n")
 
     async def _follow(self, process: asyncio.subprocess.Process) -> None:
         assert process.stdout is not None

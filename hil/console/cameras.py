@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 import json
 import re
-import sys
 from typing import TYPE_CHECKING, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
+from hil.console.child import begin, ordered, tell
 from hil.console.hand_over import HEAD, PICTURE
 from hil.console.orders import camera_of
 from hil.console.setup import BOARD, CAMERA_FILE, PICTURES, SETS
@@ -73,12 +73,7 @@ class Cameras:
 
     async def open(self, tree: object) -> None:
         """Look at a camera, in place of what was looked at before; raises BadInput."""
-        try:
-            look = Look.model_validate(tree)
-        except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            key = ".".join(str(part) for part in first["loc"])
-            raise BadInput(f"camera: {key}: {first['msg']}") from None
+        look = ordered(Look, tree, "camera")
         if not look.source or look.source in {"pose", "rendered"}:
             raise BadInput("camera: name a camera: its number, a video file, or twin:SOCKET")
         source = camera_of(look.source, self._folders)
@@ -91,16 +86,11 @@ class Cameras:
         for name in SETS:
             (folder / name).mkdir(parents=True, exist_ok=True)
         await self.close()
-        process = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", "hil.console.camera_worker", cwd=self._folders.work,
-            stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, start_new_session=True,
-        )  # fmt: skip
+        process = await begin("hil.console.camera_worker", self._folders.work)
         self._process = process
         self._state = {"source": look.source, "find": look.find, "auto": look.auto}
-        self._write(
-            look.model_dump()
-            | {"source": source, "folder": str(folder), "camera_file": str(camera_file)}
-        )
+        places = {"source": source, "folder": str(folder), "camera_file": str(camera_file)}
+        tell(process, look.model_dump() | places)
         task = asyncio.get_running_loop().create_task(self._follow(process))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
@@ -112,14 +102,14 @@ class Cameras:
             raise BadInput("camera: none is looked at")
         do = tree.get("what")
         if do == "take":
-            self._write({"do": "take"})
+            tell(self._process, {"do": "take"})
         elif do == "drop" and _NAME.fullmatch(str(tree.get("name", ""))):
-            self._write({"do": "drop", "name": str(tree["name"])})
+            tell(self._process, {"do": "drop", "name": str(tree["name"])})
         elif do == "auto":
             self._state["auto"] = bool(tree.get("wanted"))
-            self._write({"do": "auto", "wanted": self._state["auto"]})
+            tell(self._process, {"do": "auto", "wanted": self._state["auto"]})
         elif do == "picture" and tree.get("set") in SETS[1:]:
-            self._write({"do": "picture", "set": tree["set"]})
+            tell(self._process, {"do": "picture", "set": tree["set"]})
         else:
             raise BadInput("camera: not understood")
 
@@ -135,11 +125,6 @@ class Cameras:
         except TimeoutError:
             process.kill()
         self._over(process)
-
-    def _write(self, tree: object) -> None:
-        process = self._process
-        if process is not None and process.stdin is not None and not process.stdin.is_closing():
-            process.stdin.write(json.dumps(tree).encode() + b"\n")
 
     async def _follow(self, process: asyncio.subprocess.Process) -> None:
         assert process.stdout is not None

@@ -6,10 +6,11 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from hil.board.wheel_laws import require_wheel_law
 from hil.config.load import builtin_names, load_scenario
+from hil.console.child import ordered
 from hil.core.errors import BadInput
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import is_file_name
@@ -68,12 +69,7 @@ class Order(BaseModel):
 
 def order_of(tree: object) -> Order:
     """Return what a page ordered; raises BadInput."""
-    try:
-        return Order.model_validate(tree)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise BadInput(f"order: {key}: {first['msg']}") from None
+    return ordered(Order, tree, "order")
 
 
 def inside(order: Order, folders: Folders) -> Order:
