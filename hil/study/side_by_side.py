@@ -20,7 +20,7 @@ from hil.record.reader import altered_files
 from hil.rigs.opening import is_simulated
 from hil.runs.execute import RunSpec
 from hil.study.work_folder import set_aside
-from hil.study.workers import when_parent_is_gone
+from hil.study.workers import submit, when_parent_is_gone
 
 if TYPE_CHECKING:
     from multiprocessing.queues import Queue
@@ -111,7 +111,7 @@ def _run_side_by_side(specs: Sequence[RunSpec], update: Update, workers: int) ->
     stop = context.Event()
     pool = ProcessPoolExecutor(min(workers, len(specs)), context, _start_worker, (news, stop))
     try:
-        futures = [pool.submit(_work, spec) for spec in specs]
+        futures = [submit(pool, _work, spec) for spec in specs]
         _follow(futures, news, update)
         for future in futures:
             future.result()

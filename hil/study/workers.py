@@ -7,7 +7,27 @@ import os
 import signal
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.process import BaseProcess
+from typing import TypeVar
+
+from hil.runs.interruption import CtrlC
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+
+def submit(
+    pool: ProcessPoolExecutor, function: Callable[[Job], Result], job: Job
+) -> Future[Result]:
+    """Hand a job to a pool; a signal that comes meanwhile is obeyed after that.
+
+    A pool starts its workers as jobs come. One whose start is broken off would tell of that by a traceback.
+    """
+    with CtrlC() as later:
+        future = pool.submit(function, job)
+    later.obey()
+    return future
 
 
 def leave_ctrl_c_to_parent() -> None:

@@ -15,7 +15,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Generic, Self, TypeVar
 
 from hil.core.errors import RigFault
-from hil.study.workers import leave_ctrl_c_to_parent
+from hil.study.workers import leave_ctrl_c_to_parent, submit
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -128,7 +128,7 @@ def _hand_out(
     """Keep `most` jobs running until none is left; what is in `running` has not been yielded."""
     while todo or running:
         while todo and len(running) < most:
-            future = pool.submit(function, todo.first)  # raises when the pool is broken
+            future = submit(pool, function, todo.first)  # raises when the pool is broken
             running[future] = todo.popleft()
         done, _ = wait(running, return_when=FIRST_COMPLETED)
         for future in done:
