@@ -56,9 +56,10 @@ def command(
     the ELF that is uploaded to the board, under simavr. --fit answers in
     closed loop, on a twin whose parameters are fitted to RUN, with the residual of that fit.
     """
+    from hil.core.files import claim_folder
     from hil.replays.elf import elf as elf_firmware
     from hil.replays.firmware import core, replay_wheels
-    from hil.replays.output import claim_folder, write_output
+    from hil.replays.output import write_output
     from hil.replays.what_if import what_if
     from hil.study.log_fit.replay import is_imported
 
@@ -126,8 +127,7 @@ def _replay_imported(run: Path, changed: list[str], out: Path | None, as_json: b
     import json
 
     from hil.core.errors import BadInput
-    from hil.core.files import replace_file
-    from hil.replays.output import claim_folder
+    from hil.core.files import claim_folder, replace_file
     from hil.study.log_fit.page import write_page
     from hil.study.log_fit.replay import replay_imported
 

@@ -50,6 +50,16 @@ def replacing(path: Path) -> Iterator[Path]:
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 
 
+def claim_folder(folder: Path) -> None:
+    """Make the folder that `--out` names, or take an empty one; raises BadInput for any other, untouched."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise BadInput(f"--out {folder}: the folder is not empty; name a new one")
+    except OSError as error:
+        raise BadInput(f"--out {folder}: cannot be made: {error.strerror}") from None
+
+
 def unwritable(what: str, error: OSError) -> HilError:
     """Return what is to be raised for a file that cannot be written, which `what` names.
 

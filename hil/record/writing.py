@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import IO, Self
 
 from hil.core.errors import BadInput, RecordFault
+from hil.core.files import claim_folder
 
 # Room for the last manifest on a disk that has none left, bytes.
 _RESERVE_BYTES = 65_536
@@ -34,12 +35,7 @@ class Keeping:
 
         Raises BadInput, RecordFault.
         """
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            if any(folder.iterdir()):
-                raise BadInput(f"--out {folder}: the folder is not empty; name a new one")
-        except OSError as error:
-            raise BadInput(f"--out {folder}: cannot be made: {error.strerror}") from None
+        claim_folder(folder)
         keeping = cls(folder)
         try:
             keeping.reserve()

@@ -9,22 +9,11 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hil.core.errors import BadInput
 from hil.core.files import replace_file
 from hil.record.journal import write_parquet
 
 if TYPE_CHECKING:
     from hil.replays.exact import ReplayReport
-
-
-def claim_folder(folder: Path) -> None:
-    """Make the folder, or take an empty one; raises BadInput for anything else."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if any(folder.iterdir()):
-            raise BadInput(f"--out {folder}: the folder is not empty; name a new one")
-    except OSError as error:
-        raise BadInput(f"--out {folder}: cannot be made: {error.strerror}") from None
 
 
 def write_output(folder: Path, report: ReplayReport, document: dict[str, Any]) -> None:
