@@ -135,13 +135,14 @@ def compute(
     if rows < 2:
         raise BadInput(f"run record: {rows} rows of samples, the figures need at least 2")
     true_error = has_truth(columns)
-    who = "true" if true_error else "est"
+    who, names = "true" if true_error else "est", _names_of_error(true=true_error)
+    span_s = _ends(columns, "t_s")
     with np.errstate(over="ignore", invalid="ignore"):  # of a damaged record: they are inf or NaN
         values = (
-            _error_figures(columns)
-            | _motion_figures(columns, who)
+            _error_figures(columns, names, span_s)
+            | _motion_figures(columns, who, names[0], span_s)
             | _effort_figures(columns)
-            | _sliding_figures(columns)
+            | _sliding_figures(columns, span_s[0])
             | sliding.figures(columns, who, law or LawFacts())
             | _timing_figures(columns, link or LinkStats())
         )
@@ -209,7 +210,11 @@ def has_truth(columns: Columns) -> bool:
 
 def error_names(columns: Columns) -> tuple[str, str]:
     """Return the names of delta1's columns, world X and Y: those of the truth where there is one."""
-    prefix = "true_delta1" if has_truth(columns) else "delta1"
+    return _names_of_error(true=has_truth(columns))
+
+
+def _names_of_error(*, true: bool) -> tuple[str, str]:
+    prefix = "true_delta1" if true else "delta1"
     return f"{prefix}_x_m", f"{prefix}_y_m"
 
 
@@ -250,9 +255,10 @@ class _Settling:
         return self._since_s - self._start_s
 
 
-def _error_figures(columns: Columns) -> dict[str, float]:
-    names = error_names(columns)
-    start_s, end_s = _ends(columns, "t_s")
+def _error_figures(
+    columns: Columns, names: tuple[str, str], span_s: tuple[float, float]
+) -> dict[str, float]:
+    start_s, end_s = span_s
     bands = {name: _Settling(band, start_s) for name, band in _BANDS.items()}
     ise, iae, itae, worst, final = [], [], [], [], math.nan
     for piece in pieces(columns, ["t_s", *names], before=1):
@@ -274,17 +280,19 @@ def _error_figures(columns: Columns) -> dict[str, float]:
     } | {name: band.time_s for name, band in bands.items()}
 
 
-def _motion_figures(columns: Columns, who: str) -> dict[str, float]:
+def _motion_figures(
+    columns: Columns, who: str, error_x_name: str, span_s: tuple[float, float]
+) -> dict[str, float]:
     x_name, y_name = f"{who}_x_m", f"{who}_y_m"
     way_m = [
         np.hypot(np.diff(piece[x_name]), np.diff(piece[y_name])).sum()
         for piece in pieces(columns, [x_name, y_name], before=1)
     ]
     first_rad, last_rad = _ends(columns, f"{who}_theta_rad")
-    start_s, end_s = _ends(columns, "t_s")
+    start_s, end_s = span_s
     return {
         "path_length_m": _sum(way_m),
-        "start_offset_x_m": _ends(columns, error_names(columns)[0])[0],
+        "start_offset_x_m": _ends(columns, error_x_name)[0],
         "turn_rad": last_rad - first_rad,
         "duration_s": end_s - start_s,
     }
@@ -302,10 +310,9 @@ def _effort_figures(columns: Columns) -> dict[str, float]:
     }
 
 
-def _sliding_figures(columns: Columns) -> dict[str, float]:
+def _sliding_figures(columns: Columns, start_s: float) -> dict[str, float]:
     changes = _sign_changes(columns, "s_x_m_s2") + _sign_changes(columns, "s_y_m_s2")
     ran_s, known, reached_s = [], False, math.nan
-    start_s, _ = _ends(columns, "t_s")
     for piece in pieces(columns, ["t_s", "in_layer", *sliding.RESTING], before=1):
         t_s, inside = piece["t_s"], piece["in_layer"]
         ran_s.append(np.diff(t_s)[sliding.law_ran(piece)[:-1]].sum())

@@ -180,6 +180,7 @@ class _Sender:
         self._run = run
         self._colour = colour
         self._put = put
+        self._error = metrics.error_names(run.samples) if row_count(run.samples) else ()
 
     def _log_static(self, entity: str, *what: rr.AsComponents) -> None:
         self._recording.log(f"{self._name}/{entity}", *what, static=True)
@@ -190,11 +191,13 @@ class _Sender:
 
     def _pieces(self, names: Sequence[str]) -> Iterator[Columns]:
         """Yield columns of the samples in pieces, the errors of the charts worked out among them."""
-        error = metrics.error_names(self._run.samples)
         recorded = [name for name in names if name not in _DERIVED]
+        error = self._error if len(recorded) < len(names) else ()
         for piece in pieces(self._run.samples, ["t_s", *dict.fromkeys((*recorded, *error))]):
-            x_m, y_m = (piece[name] for name in error)
-            yield piece | {"error_x_m": x_m, "error_y_m": y_m, "error_norm_m": np.hypot(x_m, y_m)}
+            if error:
+                x_m, y_m = (piece[name] for name in error)
+                piece |= dict(zip(_DERIVED, (x_m, y_m, np.hypot(x_m, y_m)), strict=True))
+            yield piece
             self._put()
 
     def send(self, style: _LineStyle) -> None:
