@@ -90,6 +90,28 @@ def test_a_robot_is_brought_up_with_the_page_as_guide(tmp_path, open_page):
 
 @realtime
 @chromium_needed
+def test_what_is_typed_stays_when_the_suggestion_comes_late(tmp_path, open_page):
+    """The page's first value for a field is not put under the hands of the one who types there."""
+    held = []
+    with Console(tmp_path) as console:
+        page = open_page(console)
+        page.wait_for_load_state("networkidle")
+        page.route("**/api/choices*", lambda route: held.append(route))  # noqa: PLW0108 - it is marked
+        page.click("nav a[href='#setup']")
+        page.focus("#c-source")
+        while not held:
+            page.wait_for_timeout(50)
+        with page.expect_response("**/api/choices*"):
+            for route in held:
+                route.continue_()
+        page.wait_for_load_state("networkidle")
+        page.keyboard.insert_text("board.avi")
+        assert page.input_value("#c-source") == "board.avi"
+        assert page.input_value("#b-robot") == "thesis-4wd"  # what else the answer brings is there
+
+
+@realtime
+@chromium_needed
 def test_a_camera_is_looked_at_live(tmp_path, open_page):
     """Corners and coverage of a board, views taken and rejected; tags by number; a source that is none."""
     from playwright.sync_api import expect  # noqa: PLC0415

@@ -1,5 +1,5 @@
 // Bring-up, guided: what to do, a picture of it, what was measured; the wheels are off at every question.
-import { ask, byId, command, el, fill, number, when, who } from "./core.js";
+import { ask, byId, command, el, fill, number, suggest, when, who } from "./core.js";
 
 let state = { on: false };
 const FREE = "ALL wheels are off the ground; they will turn, up to full speed";
@@ -26,7 +26,7 @@ export async function refresh() {
   fill(byId("b-robot"), ...robots.map((item) => el("option", { value: item.name }, item.name)));
   byId("b-robot").value = "thesis-4wd";
   const now = byId("target")?.value || target;
-  byId("b-target").value ||= now.startsWith("serial:") ? now : "";
+  suggest(byId("b-target"), now.startsWith("serial:") ? now : "");
   ready();
   told();
 }

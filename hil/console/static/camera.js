@@ -1,5 +1,5 @@
 // A camera looked at live: corners and coverage of a board, tags, the robot; views taken and rejected; what is in force.
-import { ask, byId, command, el, fill, number, tried, when, who } from "./core.js";
+import { ask, byId, command, el, fill, number, suggest, tried, when, who } from "./core.js";
 
 let state = { on: false }, refreshSet = () => {};
 const FIND = [["board", "a calibration board"], ["tags", "tags"], ["robot", "the robot, with the camera file below"], ["nothing", "nothing"]];
@@ -28,7 +28,7 @@ export function make(whenTaken) {
 
 export async function refresh() {
   const { camera, served } = await ask("/api/choices");
-  byId("c-source").value ||= camera || served[0]?.camera || "0";
+  suggest(byId("c-source"), camera || served[0]?.camera || "0");
   told();
 }
 

@@ -18,6 +18,10 @@ export function fill(parent, ...children) {
 }
 
 export const byId = (id) => document.getElementById(id);
+// A first value for a field that is empty, and never under the hands of the one who is typing there.
+export function suggest(field, value) {
+  if (!field.value && document.activeElement !== field) field.value = value;
+}
 export const number = (value, digits = 2) => (Number.isFinite(value) ? value.toFixed(digits) : "–");
 
 function ownKey() {

@@ -1,5 +1,5 @@
 // The form of a run: what to run, where, and which values are changed, with their bounds, units and meaning.
-import { ask, byId, el, fill, say, tried, who } from "./core.js";
+import { ask, byId, el, fill, say, suggest, tried, who } from "./core.js";
 
 let choices = null;
 let described = null;
@@ -38,9 +38,9 @@ export async function refresh() {
   options(byId("law"), [{ name: "", summary: "as the scenario says" }, ...choices.laws]);
   options(byId("inner"), choices.inner.map((name) => ({ name, summary: "" })));
   fill(byId("targets"), ...choices.targets.map((item) => el("option", { value: item.name }, item.summary)));
-  byId("target").value ||= choices.target;
+  suggest(byId("target"), choices.target);
   if (byId("target").value === "twin") byId("target").value = choices.target;
-  byId("camera").value ||= choices.camera;
+  suggest(byId("camera"), choices.camera);
   const cameras = [["pose", "no pictures, drawn errors"], ["rendered", "pictures"], ["0", "first camera"], ...choices.served.map((item) => [item.camera, item.summary])];
   fill(byId("cameras"), ...cameras.map(([value, text]) => el("option", { value }, text)));
   simulatedOnly();
@@ -66,7 +66,7 @@ async function load() {
 
 function simulatedOnly() {
   const served = choices?.served.find((item) => item.name === byId("target").value);
-  if (served && !byId("camera").value) byId("camera").value = served.camera;
+  if (served) suggest(byId("camera"), served.camera);
   byId("real-time").disabled = !["twin", "pil"].includes(byId("target").value);
 }
 
