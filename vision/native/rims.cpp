@@ -8,10 +8,13 @@ namespace vision {
 namespace {
 
 constexpr int kGainRays = 9;  // over which gain and noise are
-// How far from the rim an edge is looked for, and how far beyond that its two levels are taken, in
-// radii. The longer, the more noise gets in; blur at 0.5 m/s over 20 ms is 0.17 each way.
-constexpr std::array<std::pair<double, double>, kLengths> kReaches = {
-    {{0.18, 0.3}, {0.35, 0.2}, {0.52, 0.15}}};
+// In radii: how far from the rim an edge is looked for, how far its two levels are away, and over how
+// much they are taken. The longer, the more noise gets in; blur at 0.5 m/s over 20 ms is 0.17 each way.
+struct Ratios {
+  double edge, ends, level;
+};
+constexpr std::array<Ratios, kLengths> kReaches = {
+    {{0.18, 0.18, 0.3}, {0.35, 0.35, 0.2}, {0.52, 0.52, 0.15}, {0.18, 0.52, 0.15}}};
 constexpr double kReachMinPx = 1.6;
 // A ray counts when its step is this share of the disc's typical one, and its edge in the profile.
 constexpr double kStepShare = 0.3;
@@ -120,17 +123,28 @@ struct Swing {
   Round rise, swing, inner, outer, low, high;
 };
 
+// Where a profile's mean and its two levels are taken, samples: the mean within `edge` of its middle,
+// the levels from `ends` on.
+struct Reach {
+  int edge, ends, level;
+  double lean;
+};
+
 // How far between its two levels the mean of each profile is: -1 all outside, 1 all inside.
+// With `usual` the level outside is that round most of the disc.
 Swing swing(const std::vector<float>& response, const std::vector<double>& sums, int samples, int middle,
-            int edge, int level, double lean) {
+            const Reach& reach, bool usual) {
+  const auto [edge, ends, level, lean] = reach;
   Round inner, outer, between;
   for (int ray = 0; ray < kRays; ++ray) {
     const double* s = &sums[ray * (samples + 1)];
     const float* r = &response[ray * samples];
     const int first = middle - edge;
     const int last = middle + edge;
-    inner[ray] = (s[first] - s[first - level]) / level;
-    outer[ray] = (s[last + 1 + level] - s[last + 1]) / level;
+    const int in = middle - ends;
+    const int out = middle + ends;
+    inner[ray] = (s[in] - s[in - level]) / level;
+    outer[ray] = (s[out + 1 + level] - s[out + 1]) / level;
     between[ray] = (s[last + 1] - s[first] - 0.5 * (r[first] + r[last])) * (0.5 / edge);
   }
   const Round low = about(outer, kLevelRays);
@@ -140,9 +154,11 @@ Swing swing(const std::vector<float>& response, const std::vector<double>& sums,
   found.outer = outer;
   found.low = low;
   found.high = high;
+  const double usual_dn = usual ? median(low) : 0.0;
   for (int ray = 0; ray < kRays; ++ray) {
-    found.rise[ray] = high[ray] - low[ray];
-    found.swing[ray] = 2.0 * (between[ray] - low[ray]) / std::max(found.rise[ray], 1.0) - 1.0;
+    const double ground = usual ? usual_dn : low[ray];
+    found.rise[ray] = high[ray] - ground;
+    found.swing[ray] = 2.0 * (between[ray] - ground) / std::max(found.rise[ray], 1.0) - 1.0;
   }
   return found;
 }
@@ -177,16 +193,17 @@ Round strangeness(const Round& outer, const Round& low, double usual, int level)
 }  // namespace
 
 double reach_px(double radius_px) {
-  const double reach = std::max(kReaches[kLengths - 1].first * radius_px, kReachMinPx);
+  const double reach = std::max(kReaches[kLengths - 1].ends * radius_px, kReachMinPx);
   return std::min(reach, 0.8 * radius_px);
 }
 
 Profiles::Profiles(double radius_px) : half_(0) {
   for (int k = 0; k < kLengths; ++k) {
-    const auto [reach, level] = kReaches[k];
+    const auto [reach, ends, level] = kReaches[k];
     edge_[k] = static_cast<int>(std::ceil(std::max(reach * radius_px, kReachMinPx)));
+    ends_[k] = static_cast<int>(std::ceil(std::max(ends * radius_px, kReachMinPx)));
     level_[k] = std::max(2, static_cast<int>(std::nearbyint(level * radius_px)));
-    half_ = std::max(half_, edge_[k] + level_[k] + 1);
+    half_ = std::max(half_, ends_[k] + level_[k] + 1);
     // Longer ones are for blurred rims, whose levels fall to one side with the blur and not with light.
     const double levels_at = radius_px - edge_[k] - 0.5 * level_[k];
     lean_[k] = k == 0 && levels_at > 0.5 * radius_px ? (radius_px - 0.5 * edge_[k]) / levels_at - 1.0 : 0.0;
@@ -200,9 +217,11 @@ Edges Profiles::edges(const std::vector<float>& response) const {
   for (int k = 0; k < kLengths; ++k) {
     Length& own = lengths[k];
     const int e = edge_[k];
-    const Swing here = swing(response, sums, n, half_, e, level_[k], lean_[k]);
-    const Swing in = swing(response, sums, n, half_ - 1, e, level_[k], lean_[k]);
-    const Swing out = swing(response, sums, n, half_ + 1, e, level_[k], lean_[k]);
+    const Reach reach = {e, ends_[k], level_[k], lean_[k]};
+    const bool usual = k == kLengths - 1;
+    const Swing here = swing(response, sums, n, half_, reach, usual);
+    const Swing in = swing(response, sums, n, half_ - 1, reach, usual);
+    const Swing out = swing(response, sums, n, half_ + 1, reach, usual);
     own.rise = here.rise;
     own.inner = here.inner;
     own.low = here.low;

@@ -13,7 +13,7 @@
 namespace vision {
 
 constexpr int kRays = 48;
-constexpr int kLengths = 3;
+constexpr int kLengths = 4;
 // Rays over which an edge's two levels are averaged: a sixth of the rim follows a shadow's edge.
 constexpr int kLevelRays = 7;
 
@@ -36,7 +36,7 @@ class Profiles {
  public:
   explicit Profiles(double radius_px);
 
-  int edge() const { return edge_[kLengths - 1]; }
+  int edge() const { return ends_[kLengths - 1]; }
   int half() const { return half_; }
   int samples() const { return 2 * half_ + 1; }
   // The first of two samples next to the rim: inside, and outside.
@@ -47,7 +47,7 @@ class Profiles {
   Edges edges(const std::vector<float>& response) const;
 
  private:
-  std::array<int, kLengths> edge_, level_;
+  std::array<int, kLengths> edge_, ends_, level_;
   std::array<double, kLengths> lean_;
   int half_;
 };
