@@ -24,6 +24,8 @@ constexpr double kRekeepPx = 0.5;
 constexpr double kOutlierSigmas = 3.0;
 // Of five rays side by side, more of which must have an edge for that in the middle.
 constexpr int kBesideMin = 3;
+// So few kept rays side by side lie between two parts of a cover, whose levels they share.
+constexpr int kRunMin = 4;
 constexpr double kEdgeSigmaMinPx = 0.05;
 constexpr double kOffMax = 0.4;  // of the radius: a square's corners
 // Doubt of the radius before the fit, relative, as a pull towards the known one.
@@ -63,6 +65,22 @@ Mask clear_of_cover(const Mask& usable) {
   return clear;
 }
 
+// Kept rays without short runs of them, unless hardly any would be left.
+Mask without_short_runs(const Mask& keep) {
+  Mask long_runs = keep;
+  for (int first = 0; first < kRays; ++first) {
+    int length = 0;
+    while (length < kRunMin && keep[(first + length) % kRays]) {
+      ++length;
+    }
+    const bool starts = !keep[(first + kRays - 1) % kRays];
+    for (int i = 0; starts && length < kRunMin && i < length; ++i) {
+      long_runs[(first + i) % kRays] = false;
+    }
+  }
+  return count(long_runs) < kRays / 6 ? keep : long_runs;
+}
+
 // (du, dv, growth) by least squares; none when too little of the rim is left.
 std::optional<Move> solved(const std::array<Move, kRays>& rows, const Round& shift, const Mask& keep) {
   if (count(keep) < kRays / 6) {
@@ -98,7 +116,7 @@ double spread(const Round& rest, const Mask& keep) {
 std::optional<Move> robust(const std::array<Move, kRays>& rows, const Round& shift, const Mask& usable,
                            int tries, Mask& keep) {
   for (int i = 0; i < tries; ++i) {
-    const std::optional<Move> move = solved(rows, shift, keep);
+    const std::optional<Move> move = solved(rows, shift, without_short_runs(keep));
     if (!move) {
       return std::nullopt;
     }
@@ -116,7 +134,7 @@ std::optional<Move> robust(const std::array<Move, kRays>& rows, const Round& shi
     }
     keep = within;
   }
-  return solved(rows, shift, keep);
+  return solved(rows, shift, without_short_runs(keep));
 }
 
 // Where a change of every ray's edge, in samples, moves the centre.
@@ -274,11 +292,13 @@ bool RimFitter::step(const Picture& picture, Vec2 px, const Colour& weights, con
 
 Disc RimFitter::disc(const Picture& picture, const Step& step, Evidence& evidence) const {
   const auto& [du, dv, growth] = step.move;
+  const Mask used = without_short_runs(step.keep);
   Round rest = {};
   Round off;
   std::vector<float> ratios;
   double squares = 0.0;
   double gain = 0.0;
+  int shown = 0;
   const auto brightness = [&](int ray, int first) {
     float sum = 0.0F;
     for (int i = first; i < first + 2; ++i) {
@@ -292,7 +312,8 @@ Disc RimFitter::disc(const Picture& picture, const Step& step, Evidence& evidenc
   for (int ray = 0; ray < kRays; ++ray) {
     const double left = step.shift[ray] - dot3(step.rows[ray], step.move);
     off[ray] = std::clamp(left, -kOffMax * step.shape.radius_px, kOffMax * step.shape.radius_px);
-    if (step.keep[ray]) {
+    shown += step.keep[ray] ? 1 : 0;
+    if (used[ray]) {
       rest[ray] = left;
       squares += rest[ray] * rest[ray];
       gain += step.edges.gain[ray];
@@ -303,11 +324,11 @@ Disc RimFitter::disc(const Picture& picture, const Step& step, Evidence& evidenc
   const int kept = static_cast<int>(ratios.size());
   std::nth_element(ratios.begin(), ratios.begin() + kept / 2, ratios.end());
   const double share = static_cast<double>(kept) / kRays;
-  const Matrix centre = inverse(normal(step.rows, step.keep)).value_or(Matrix{});
+  const Matrix centre = inverse(normal(step.rows, used)).value_or(Matrix{});
   evidence = {rim_noise(rest, kept),
               {centre[0][0], centre[0][1], centre[1][1]},
-              moved(centre, step.rows, step.scale, step.keep, step.edges.ground),
-              moved(centre, step.rows, step.scale, step.keep, step.edges.cover),
+              moved(centre, step.rows, step.scale, used, step.edges.ground),
+              moved(centre, step.rows, step.scale, used, step.edges.cover),
               step.shape.radius_px,
               share,
               gain / kept};
@@ -315,7 +336,7 @@ Disc RimFitter::disc(const Picture& picture, const Step& step, Evidence& evidenc
               step.from_px.y + dv,
               step.shape.radius_px,
               growth,
-              share,
+              static_cast<double>(shown) / kRays,
               std::sqrt(squares / kept),
               {},
               step.edges.typical_dn,
