@@ -21,8 +21,8 @@ constexpr double kStepShare = 0.3;
 constexpr double kShiftShare = 0.8;
 constexpr double kResponseMinDn = 6.0;
 constexpr double kGainMin = 0.02;
-// Ground so many deviations off that round most of the disc may be another thing, which blur has
-// brought near. Its noise is that between rays so far apart that they share no pixels.
+// Ground within so many deviations of that round most of the disc is the same ground and noise; what is
+// beyond may be another thing. Noise of a ray is that between rays so far apart that they share no pixels.
 constexpr double kUsualSpreads = 2.0;
 constexpr int kStepRays = 3;
 constexpr double kOwnMinDn = 0.3;
@@ -119,6 +119,20 @@ Round leaning(const Round& inner, double lean) {
   return leant;
 }
 
+// Levels outside, less what their spread round the disc lets them be off that round most of it.
+Round settled(const Round& levels) {
+  const double usual = median(levels);
+  Round away;
+  for (int ray = 0; ray < kRays; ++ray) {
+    away[ray] = std::abs(levels[ray] - usual);
+  }
+  const double free = kUsualSpreads * 1.4826 * median(away);
+  for (int ray = 0; ray < kRays; ++ray) {
+    away[ray] = usual + std::copysign(std::max(away[ray] - free, 0.0), levels[ray] - usual);
+  }
+  return away;
+}
+
 struct Swing {
   Round rise, swing, inner, outer, low, high;
 };
@@ -147,7 +161,7 @@ Swing swing(const std::vector<float>& response, const std::vector<double>& sums,
     outer[ray] = (s[out + 1 + level] - s[out + 1]) / level;
     between[ray] = (s[last + 1] - s[first] - 0.5 * (r[first] + r[last])) * (0.5 / edge);
   }
-  const Round low = about(outer, kLevelRays);
+  const Round low = settled(about(outer, kLevelRays));
   const Round high = leaning(inner, lean);
   Swing found;
   found.inner = inner;
@@ -174,18 +188,13 @@ void take_better_side(Round& level, Round& gain) {
   }
 }
 
-// How far the ground outside each ray is from that round most of the disc, beyond what its noise lets
-// it be, in units of the noise of one sample; `level` samples of a ray make its own ground, `outer`.
+// How far the ground outside each ray is from that round most of the disc, in units of the noise of one
+// sample; `level` samples of a ray make its own ground, `outer`.
 Round strangeness(const Round& outer, const Round& low, double usual, int level) {
+  const double sample_dn = std::max(ray_noise_dn(outer), kOwnMinDn) * std::sqrt(static_cast<double>(level));
   Round away;
   for (int ray = 0; ray < kRays; ++ray) {
-    away[ray] = std::abs(low[ray] - usual);
-  }
-  const double own_dn = std::max(ray_noise_dn(outer), kOwnMinDn);
-  const double free_dn = kUsualSpreads * own_dn / std::sqrt(static_cast<double>(kLevelRays) / kStepRays);
-  const double sample_dn = own_dn * std::sqrt(static_cast<double>(level));
-  for (double& one : away) {
-    one = std::max(one - free_dn, 0.0) / sample_dn;
+    away[ray] = std::abs(low[ray] - usual) / sample_dn;
   }
   return away;
 }
