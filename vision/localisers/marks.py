@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 # What is accepted.
-SHARE_MIN = 0.4
+SHARE_MIN = 0.33
 GROWTH_MAX = 0.12
 GROWTH_DOUBT = 0.5  # more where the rim is rough: noise, blur longer than the profiles
 RESIDUAL_MAX = 0.09  # of the radius

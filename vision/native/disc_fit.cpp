@@ -22,6 +22,9 @@ constexpr double kCentroidLevel = 0.4;  // of the way from the surroundings to t
 constexpr double kSettledPx = 0.03;
 constexpr double kRekeepPx = 0.5;
 constexpr double kOutlierSigmas = 3.0;
+// Rays are as close together as they are so far inside, in radii; the least length of one, relative.
+constexpr double kInside = 0.25;
+constexpr double kLengthMin = 0.1;
 // Of five rays side by side, more of which must have an edge for that in the middle.
 constexpr int kBesideMin = 3;
 // So few kept rays side by side lie between two parts of a cover, whose levels they share.
@@ -31,10 +34,13 @@ constexpr double kOffMax = 0.4;  // of the radius: a square's corners
 // Doubt of the radius before the fit, relative, as a pull towards the known one.
 constexpr double kRadiusSigma = 0.02;
 constexpr double kRadiusPull = (0.15 / kRadiusSigma) * (0.15 / kRadiusSigma);
+// And as one towards that of the other disc, of which more is seen: light, blur and lens grow both alike.
+constexpr double kAlikeSigma = 0.0027;
+constexpr double kAlikePull = (0.15 / kAlikeSigma) * (0.15 / kAlikeSigma);
 
 int count(const Mask& keep) { return static_cast<int>(std::count(keep.begin(), keep.end(), true)); }
 
-Matrix normal(const std::array<Move, kRays>& rows, const Mask& keep) {
+Matrix normal(const std::array<Move, kRays>& rows, const Mask& keep, double pull) {
   Matrix n = {};
   for (int ray = 0; ray < kRays; ++ray) {
     for (int i = 0; keep[ray] && i < 3; ++i) {
@@ -43,7 +49,7 @@ Matrix normal(const std::array<Move, kRays>& rows, const Mask& keep) {
       }
     }
   }
-  n[2][2] += kRadiusPull;
+  n[2][2] += pull;
   return n;
 }
 
@@ -82,15 +88,16 @@ Mask without_short_runs(const Mask& keep) {
 }
 
 // (du, dv, growth) by least squares; none when too little of the rim is left.
-std::optional<Move> solved(const std::array<Move, kRays>& rows, const Round& shift, const Mask& keep) {
+std::optional<Move> solved(const std::array<Move, kRays>& rows, const Round& shift, const Mask& keep,
+                           const RadiusPull& radius) {
   if (count(keep) < kRays / 6) {
     return std::nullopt;
   }
-  const std::optional<Matrix> covariance = inverse(normal(rows, keep));
+  const std::optional<Matrix> covariance = inverse(normal(rows, keep, radius.pull));
   if (!covariance) {
     return std::nullopt;
   }
-  Move right = {};
+  Move right = {0.0, 0.0, radius.pull * radius.growth};
   for (int ray = 0; ray < kRays; ++ray) {
     for (int i = 0; keep[ray] && i < 3; ++i) {
       right[i] += rows[ray][i] * shift[ray];
@@ -114,9 +121,9 @@ double spread(const Round& rest, const Mask& keep) {
 
 // (du, dv, growth) without the rays far off the fit, which leave `keep`; `tries` times to find them.
 std::optional<Move> robust(const std::array<Move, kRays>& rows, const Round& shift, const Mask& usable,
-                           int tries, Mask& keep) {
+                           const RadiusPull& radius, int tries, Mask& keep) {
   for (int i = 0; i < tries; ++i) {
-    const std::optional<Move> move = solved(rows, shift, without_short_runs(keep));
+    const std::optional<Move> move = solved(rows, shift, without_short_runs(keep), radius);
     if (!move) {
       return std::nullopt;
     }
@@ -134,7 +141,7 @@ std::optional<Move> robust(const std::array<Move, kRays>& rows, const Round& shi
     }
     keep = within;
   }
-  return solved(rows, shift, without_short_runs(keep));
+  return solved(rows, shift, without_short_runs(keep), radius);
 }
 
 // Where a change of every ray's edge, in samples, moves the centre.
@@ -173,14 +180,25 @@ std::optional<RimFitter::Shape> RimFitter::shape(Vec2 px) const {
     reach = std::max({reach, std::abs(found.arms[ray].x), std::abs(found.arms[ray].y)});
   }
   double radius = 0.0;
+  double around = 0.0;
   for (int ray = 0; ray < kRays; ++ray) {
     const Vec2 along = found.arms[(ray + 1) % kRays] - found.arms[(ray + kRays - 1) % kRays];
+    found.length[ray] = std::hypot(along.x, along.y);
+    around += found.length[ray] / kRays;
     // Seen from above a circle keeps its turning sense, and image rows run down.
-    found.normals[ray] = 1.0 / std::hypot(along.x, along.y) * Vec2{-along.y, along.x};
+    found.normals[ray] = 1.0 / found.length[ray] * Vec2{-along.y, along.x};
     radius += dot(found.normals[ray], found.arms[ray]) / kRays;
   }
   if (!(radius > 1.0)) {
     return std::nullopt;
+  }
+  // Rays run together inwards, the more so where the rim is bent more.
+  const double inside = kInside * radius / around;
+  for (int ray = 0; ray < kRays; ++ray) {
+    const Vec2 before = found.normals[(ray + kRays - 1) % kRays];
+    const Vec2 after = found.normals[(ray + 1) % kRays];
+    const double bent = std::abs(before.x * after.y - before.y * after.x);
+    found.length[ray] = std::max(found.length[ray] / around - inside * bent, kLengthMin);
   }
   found.radius_px = radius;
   found.step_px = reach_px(radius) / profiles_.edge();
@@ -243,7 +261,7 @@ Mask RimFitter::within(const Picture& picture, Vec2 px, const Shape& shape) cons
 }
 
 bool RimFitter::step(const Picture& picture, Vec2 px, const Colour& weights, const Mask* keep,
-                     Step& done) const {
+                     const Step* other, Step& done) const {
   const std::optional<Shape> rim = shape(px);
   if (!rim) {
     return false;
@@ -266,13 +284,17 @@ bool RimFitter::step(const Picture& picture, Vec2 px, const Colour& weights, con
     usable[ray] = done.edges.usable[ray] && seen[ray];
   }
   const Mask whole = clear_of_cover(usable);
+  // Where rays are closer together they share more pixels, and each says less.
+  Round precision;
   double information = 0.0;
-  for (const double noise : done.edges.noise) {
-    information += 1.0 / (noise * noise * kRays);
+  for (int ray = 0; ray < kRays; ++ray) {
+    const double noise = done.edges.noise[ray];
+    precision[ray] = rim->length[ray] / (noise * noise);
+    information += precision[ray] / kRays;
   }
   const double scale = 1.0 / std::sqrt(information);
   for (int ray = 0; ray < kRays; ++ray) {
-    const double weight = scale / done.edges.noise[ray];
+    const double weight = scale * std::sqrt(precision[ray]);
     const Vec2 n = rim->normals[ray];
     const double pull = done.edges.gain[ray] * weight;
     done.rows[ray] = {n.x * pull, n.y * pull, dot(n, rim->arms[ray]) * pull};
@@ -283,7 +305,12 @@ bool RimFitter::step(const Picture& picture, Vec2 px, const Colour& weights, con
   for (int ray = 0; keep != nullptr && ray < kRays; ++ray) {
     done.keep[ray] = whole[ray] && (*keep)[ray];
   }
-  const std::optional<Move> move = robust(done.rows, done.shift, whole, keep == nullptr ? 2 : 1, done.keep);
+  done.radius = {0.0, kRadiusPull};
+  if (other != nullptr && count(done.keep) < count(other->keep)) {
+    done.radius = {other->move[2], kAlikePull};
+  }
+  const int tries = keep == nullptr ? 2 : 1;
+  const std::optional<Move> move = robust(done.rows, done.shift, whole, done.radius, tries, done.keep);
   if (move) {
     done.move = *move;
   }
@@ -324,14 +351,16 @@ Disc RimFitter::disc(const Picture& picture, const Step& step, Evidence& evidenc
   const int kept = static_cast<int>(ratios.size());
   std::nth_element(ratios.begin(), ratios.begin() + kept / 2, ratios.end());
   const double share = static_cast<double>(kept) / kRays;
-  const Matrix centre = inverse(normal(step.rows, used)).value_or(Matrix{});
+  const Matrix centre = inverse(normal(step.rows, used, step.radius.pull)).value_or(Matrix{});
   evidence = {rim_noise(rest, kept),
               {centre[0][0], centre[0][1], centre[1][1]},
               moved(centre, step.rows, step.scale, used, step.edges.ground),
               moved(centre, step.rows, step.scale, used, step.edges.cover),
               step.shape.radius_px,
               share,
-              gain / kept};
+              gain / kept,
+              step.edges.typical_dn,
+              step.edges.lean};
   return Disc{step.from_px.x + du,
               step.from_px.y + dv,
               step.shape.radius_px,
@@ -368,7 +397,8 @@ std::optional<std::array<Disc, 2>> RimFitter::fit(const Picture& picture,
   for (int i = 0; i < kSteps; ++i) {
     double far_px = 0.0;
     for (int k = 0; k < 2; ++k) {
-      if (!step(picture, px[k], weights_[k], all_rays ? nullptr : &keep[k], steps[k])) {
+      const Step* other = i + k > 0 ? &steps[1 - k] : nullptr;
+      if (!step(picture, px[k], weights_[k], all_rays ? nullptr : &keep[k], other, steps[k])) {
         return std::nullopt;
       }
       const Move& move = steps[k].move;
@@ -376,7 +406,7 @@ std::optional<std::array<Disc, 2>> RimFitter::fit(const Picture& picture,
       keep[k] = steps[k].keep;
       far_px = std::max({far_px, std::abs(move[0]), std::abs(move[1])});
     }
-    if (far_px < kSettledPx) {
+    if (far_px < kSettledPx && (i > 0 || count(keep[0]) >= count(keep[1]))) {
       break;
     }
     all_rays = far_px > kRekeepPx;

@@ -23,7 +23,7 @@ constexpr double kResponseMinDn = 6.0;
 constexpr double kGainMin = 0.02;
 // Ground within so many deviations of that round most of the disc is the same ground and noise; what is
 // beyond may be another thing. Noise of a ray is that between rays so far apart that they share no pixels.
-constexpr double kUsualSpreads = 2.0;
+constexpr double kUsualSpreads = 3.0;
 constexpr int kStepRays = 3;
 constexpr double kOwnMinDn = 0.3;
 // A disc's level inside may fall by so much with light and shade before it is taken for covered.
@@ -62,7 +62,7 @@ const std::array<Round, 2>& turn() {
 // Level, gain and shift of the profiles of one length.
 struct Length {
   Round rise, level, gain, shift, inner, low, high, strange;
-  double usual_low, usual_high;
+  double usual_low, usual_high, lean;
 };
 
 // Running sums of the profile of each ray, kRays x (samples + 1).
@@ -96,7 +96,7 @@ double ray_noise_dn(const Round& values) {
 // Levels with their first turn round the disc grown by a share `lean`: light that falls to one side does
 // so on from where the levels are taken out to the rim. One that differs by much is a shade or a cover.
 // So does one within the noise of the rays' own levels, `inner`, which would only be added to the rest.
-Round leaning(const Round& inner, double lean) {
+Round leaning(const Round& inner, double lean, double& grown) {
   const Round levels = about(inner, kLevelRays);
   double mean = 0.0;
   double along = 0.0;
@@ -109,12 +109,14 @@ Round leaning(const Round& inner, double lean) {
   const double square = along * along + across * across;
   const double own_dn = ray_noise_dn(inner);
   const double sure = 1.0 - kLeanNoise * own_dn * own_dn / std::max(square, 1e-12);
+  grown = 0.0;
   if (lean == 0.0 || sure <= 0.0 || square > kLeanMax * kLeanMax * mean * mean) {
     return levels;
   }
+  grown = sure * lean;
   Round leant;
   for (int ray = 0; ray < kRays; ++ray) {
-    leant[ray] = levels[ray] + sure * lean * (along * turn()[0][ray] + across * turn()[1][ray]);
+    leant[ray] = levels[ray] + grown * (along * turn()[0][ray] + across * turn()[1][ray]);
   }
   return leant;
 }
@@ -135,6 +137,7 @@ Round settled(const Round& levels) {
 
 struct Swing {
   Round rise, swing, inner, outer, low, high;
+  double lean;
 };
 
 // Where a profile's mean and its two levels are taken, samples: the mean within `edge` of its middle,
@@ -162,8 +165,8 @@ Swing swing(const std::vector<float>& response, const std::vector<double>& sums,
     between[ray] = (s[last + 1] - s[first] - 0.5 * (r[first] + r[last])) * (0.5 / edge);
   }
   const Round low = settled(about(outer, kLevelRays));
-  const Round high = leaning(inner, lean);
   Swing found;
+  const Round high = leaning(inner, lean, found.lean);
   found.inner = inner;
   found.outer = outer;
   found.low = low;
@@ -235,6 +238,7 @@ Edges Profiles::edges(const std::vector<float>& response) const {
     own.inner = here.inner;
     own.low = here.low;
     own.high = here.high;
+    own.lean = here.lean;
     own.usual_low = median(own.low);
     own.usual_high = median(own.high);
     own.strange = strangeness(here.outer, own.low, own.usual_low, level_[k]);
@@ -251,6 +255,7 @@ Edges Profiles::edges(const std::vector<float>& response) const {
     take_better_side(own.level, own.gain);
   }
   Edges found;
+  found.lean = 0.0;
   Round step, inner;
   std::array<int, kRays> best;
   for (int ray = 0; ray < kRays; ++ray) {
@@ -269,6 +274,7 @@ Edges Profiles::edges(const std::vector<float>& response) const {
       }
     }
     const Length& own = lengths[best[ray]];
+    found.lean += own.lean / kRays;
     step[ray] = own.rise[ray];
     inner[ray] = own.inner[ray];
     found.shift[ray] = own.shift[ray];

@@ -22,12 +22,13 @@ using Mask = std::array<bool, kRays>;
 
 // Edges along the profiles of one disc: `shift` in samples, outwards; `gain` what a shift of the
 // disc by one sample does to it; `noise` its standard deviation for a noise of 1 DN; `typical_dn`
-// the disc's response. `ground` and `cover` are how far the shift would move if the level outside, or
+// the disc's response, `lean` by how much the first turn of its levels was grown. `ground` and `cover` are how far the shift would move if the level outside, or
 // a level inside that is much too low, were that round most of the disc.
 struct Edges {
   Round shift, gain, noise, ground, cover;
   Mask usable;
   double typical_dn;
+  double lean;
 };
 
 // The sums that turn profiles into edges. A profile has 2 `half` + 1 samples about a px apart;
