@@ -30,7 +30,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 # What is accepted.
-SHARE_MIN = 0.33
+SHARE_MIN = 0.4
+# So little of a rim is enough where it has the known radius within so much.
+SHARE_SURE_MIN, GROWTH_SURE = 0.33, 0.03
 GROWTH_MAX = 0.12
 GROWTH_DOUBT = 0.5  # more where the rim is rough: noise, blur longer than the profiles
 RESIDUAL_MAX = 0.09  # of the radius
@@ -244,8 +246,9 @@ class MarkLocaliser:
 
     def _refusal(self, disc: Disc) -> str:
         """Return why a disc cannot be a mark, "" when it can."""
-        if disc.share < SHARE_MIN:
-            return f"{disc.share:.0%} of its rim seen, limit {SHARE_MIN:.0%}"
+        least = SHARE_SURE_MIN if abs(disc.growth) <= GROWTH_SURE else SHARE_MIN
+        if disc.share < least:
+            return f"{disc.share:.0%} of its rim seen, limit {least:.0%}"
         most = GROWTH_MAX + GROWTH_DOUBT * disc.residual_px / disc.radius_px
         if not abs(disc.growth) <= most:
             return f"{1.0 + disc.growth:.2f} of its size, limit 1 +- {most:.2f}"

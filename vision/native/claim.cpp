@@ -10,24 +10,24 @@ constexpr double kTurn = 6.283185307179586;
 constexpr int kSlowTurns = 8;
 // White noise of pixels, measured on 12 radii from 4 to 32 px: how much more of it moves a centre than
 // is left in `fast`, and how much more is in `odd`; rays share pixels, the more so on a small disc.
-constexpr double kWhiteCentre = 1.52, kWhiteCentrePx = 9.0, kWhiteCentrePower = 3.2;
-constexpr double kWhiteOdd = 1.1, kWhiteOddPx = 8.0, kWhiteOddPower = 2.6;
+constexpr double kWhiteCentre = 1.18, kWhiteCentrePx = 9.5, kWhiteCentrePower = 3.2;
+constexpr double kWhiteOdd = 1.1, kWhiteOddPx = 8.6, kWhiteOddPower = 2.6;
 // Of that, the share of the levels inside, whose first turn is grown where light falls to one side.
-constexpr double kLean = 0.4;
+constexpr double kLean = 3.0;
 // Noise beyond that is of patches larger than a pixel (blocks of a JPEG, colour at half resolution,
 // smear): the larger they are, the more of it varies just once, which the fit has taken up.
-constexpr double kPatches = 1.55;
-constexpr double kPatchSlope = 0.35;
+constexpr double kPatches = 2.4;
+constexpr double kPatchSlope = 0.16;
 // Blur leaves what varies twice, alike on both sides; a share of it is not alike.
-constexpr double kTwice = 0.13;
-constexpr double kTwiceFree = 2.0;
-constexpr double kTwiceFreeFast = 3.0;
+constexpr double kTwice = 0.012;
+constexpr double kTwiceFree = 0.8;
+constexpr double kTwiceFreeFast = 1.3;
 // Of a rim of which a share is seen; and with a profile's gain (`Edges::gain`).
-constexpr double kSharePower = 2.3;
-constexpr double kGainPower = 0.85;
+constexpr double kSharePower = 0.7;
+constexpr double kGainPower = 0.06;
 // Error over what other levels would change, squared.
-constexpr double kGround = 1.3;
-constexpr double kCover = 42.0;
+constexpr double kGround = 1.6;
+constexpr double kCover = 80.0;
 // Rounding, where no noise is seen.
 constexpr double kFreePx = 0.002;
 
