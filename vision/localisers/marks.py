@@ -240,7 +240,7 @@ class MarkLocaliser:
     def _quality(self, found: _Found) -> float:
         """Return the smaller share of rim times how well rims and distance fit; 1 is whole and sharp."""
         share = min(disc.share for disc in found.discs)
-        sharp = max(disc.residual_px / disc.radius_px for disc in found.discs) / QUALITY_RESIDUAL
+        sharp = max(_rough_px(disc) / disc.radius_px for disc in found.discs) / QUALITY_RESIDUAL
         misfit = found.gap_m / (DISTANCE_TOLERANCE * self._distance_m)
         return share * math.exp(-0.5 * sharp**2 - misfit**2)
 
@@ -321,6 +321,11 @@ def _near(centres_m: Centres, found: _Found, within_m: float) -> bool:
     """Return whether a hypothesis is the one already measured."""
     pairs = zip(centres_m, found.centres_m, strict=True)
     return all(math.dist(a, b) < within_m for a, b in pairs)
+
+
+def _rough_px(disc: Disc) -> float:
+    """Return how far a rim is off its disc beyond a sensor's noise, RMS."""
+    return math.sqrt(max(disc.residual_px**2 - RESIDUAL_FREE_PX**2, 0.0))
 
 
 def _area_px(disc: Disc) -> float:
