@@ -38,7 +38,9 @@ GROWTH_DOUBT = 0.5  # more where the rim is rough: noise, blur longer than the p
 RESIDUAL_MAX = 0.09  # of the radius
 RESIDUAL_FREE_PX = 0.25  # sensor noise
 DISTANCE_TOLERANCE = 0.04
-SQUARE_MAX = 0.6  # of both marks: squares of the same width have 0.66 to 0.9, discs to 0.55
+SQUARE_MAX = 0.6  # of both marks: squares of the same width have 0.46 to 0.9, discs to 0.55
+# On average of both where so little is seen of either: a square's corners, and no cover, are left out.
+SQUARE_SHARE_MAX, SQUARE_MEAN_MAX = 0.7, 0.45
 
 # How many degrees of freedom the discs' own claims are worth against that of their distance.
 MISFIT_FREEDOM = 4.0
@@ -216,7 +218,7 @@ class MarkLocaliser:
             why = self._refusal(disc)
             if why:
                 return None, f"{name} mark: {why}"
-        if min(disc.square for disc in discs) > SQUARE_MAX:
+        if _square(discs):
             return None, "both marks have four corners"
         at = self._model.floor_point
         front, rear = (at(disc.u_px, disc.v_px, self._height_m) for disc in discs)
@@ -321,6 +323,15 @@ def _near(centres_m: Centres, found: _Found, within_m: float) -> bool:
     """Return whether a hypothesis is the one already measured."""
     pairs = zip(centres_m, found.centres_m, strict=True)
     return all(math.dist(a, b) < within_m for a, b in pairs)
+
+
+def _square(discs: Marks) -> bool:
+    """Return whether two marks have four corners each."""
+    squares = [disc.square for disc in discs]
+    if min(squares) > SQUARE_MAX:
+        return True
+    cut = max(disc.share for disc in discs) < SQUARE_SHARE_MAX
+    return cut and 0.5 * sum(squares) > SQUARE_MEAN_MAX
 
 
 def _rough_px(disc: Disc) -> float:

@@ -71,7 +71,7 @@ Mask clear_of_cover(const Mask& usable) {
   return clear;
 }
 
-// Kept rays without short runs of them, unless hardly any would be left.
+// Kept rays without short runs of them; where many are in such runs it is no cover that cut them off.
 Mask without_short_runs(const Mask& keep) {
   Mask long_runs = keep;
   for (int first = 0; first < kRays; ++first) {
@@ -84,7 +84,7 @@ Mask without_short_runs(const Mask& keep) {
       long_runs[(first + i) % kRays] = false;
     }
   }
-  return count(long_runs) < kRays / 6 ? keep : long_runs;
+  return 4 * count(long_runs) < 3 * count(keep) ? keep : long_runs;
 }
 
 // (du, dv, growth) by least squares; none when too little of the rim is left.
