@@ -40,7 +40,7 @@ RESIDUAL_FREE_PX = 0.25  # sensor noise
 DISTANCE_TOLERANCE = 0.04
 SQUARE_MAX = 0.6  # of both marks: squares of the same width have 0.46 to 0.9, discs to 0.55
 # On average of both where so little is seen of either: a square's corners, and no cover, are left out.
-SQUARE_SHARE_MAX, SQUARE_MEAN_MAX = 0.7, 0.45
+SQUARE_SHARE_MAX, SQUARE_MEAN_MAX = 0.95, 0.42
 
 # How many degrees of freedom the discs' own claims are worth against that of their distance.
 MISFIT_FREEDOM = 4.0
