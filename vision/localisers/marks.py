@@ -33,14 +33,15 @@ Array = NDArray[np.float64]
 SHARE_MIN = 0.4
 # So little of a rim is enough where it has the known radius within so much.
 SHARE_SURE_MIN, GROWTH_SURE = 0.33, 0.03
-GROWTH_MAX = 0.12
+GROWTH_MAX = 0.12  # of a rim that is seen whole
 GROWTH_DOUBT = 0.5  # more where the rim is rough: noise, blur longer than the profiles
 RESIDUAL_MAX = 0.09  # of the radius
 RESIDUAL_FREE_PX = 0.25  # sensor noise
 DISTANCE_TOLERANCE = 0.04
-SQUARE_MAX = 0.6  # of both marks: squares of the same width have 0.46 to 0.9, discs to 0.55
-# On average of both where so little is seen of either: a square's corners, and no cover, are left out.
-SQUARE_SHARE_MAX, SQUARE_MEAN_MAX = 0.95, 0.42
+# Squares of the same width are four-cornered by 0.5 to 0.9 on average of both, discs to 0.6. What is left
+# out of a square's rim are its corners: less is enough where both rims, or one, are not whole.
+SQUARE_MAX, SQUARE_MAX_CUT, SQUARE_MAX_BOTH_CUT = 0.65, 0.52, 0.42
+WHOLE_SHARE = 0.96
 
 # How many degrees of freedom the discs' own claims are worth against that of their distance.
 MISFIT_FREEDOM = 4.0
@@ -251,7 +252,7 @@ class MarkLocaliser:
         least = SHARE_SURE_MIN if abs(disc.growth) <= GROWTH_SURE else SHARE_MIN
         if disc.share < least:
             return f"{disc.share:.0%} of its rim seen, limit {least:.0%}"
-        most = GROWTH_MAX + GROWTH_DOUBT * disc.residual_px / disc.radius_px
+        most = GROWTH_MAX * disc.share + GROWTH_DOUBT * disc.residual_px / disc.radius_px
         if not abs(disc.growth) <= most:
             return f"{1.0 + disc.growth:.2f} of its size, limit 1 +- {most:.2f}"
         most_px = RESIDUAL_FREE_PX + RESIDUAL_MAX * disc.radius_px
@@ -327,11 +328,9 @@ def _near(centres_m: Centres, found: _Found, within_m: float) -> bool:
 
 def _square(discs: Marks) -> bool:
     """Return whether two marks have four corners each."""
-    squares = [disc.square for disc in discs]
-    if min(squares) > SQUARE_MAX:
-        return True
-    cut = max(disc.share for disc in discs) < SQUARE_SHARE_MAX
-    return cut and 0.5 * sum(squares) > SQUARE_MEAN_MAX
+    cut = sum(disc.share < WHOLE_SHARE for disc in discs)
+    most = (SQUARE_MAX, SQUARE_MAX_CUT, SQUARE_MAX_BOTH_CUT)[cut]
+    return 0.5 * sum(disc.square for disc in discs) > most
 
 
 def _rough_px(disc: Disc) -> float:

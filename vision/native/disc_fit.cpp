@@ -36,6 +36,7 @@ constexpr double kRadiusSigma = 0.02;
 constexpr double kRadiusPull = (0.15 / kRadiusSigma) * (0.15 / kRadiusSigma);
 // And as one towards that of the other disc, of which more is seen: light, blur and lens grow both alike.
 constexpr double kAlikeSigma = 0.0027;
+constexpr double kAlikeMax = 0.03;  // off it a disc is of another size
 constexpr double kAlikePull = (0.15 / kAlikeSigma) * (0.15 / kAlikeSigma);
 
 int count(const Mask& keep) { return static_cast<int>(std::count(keep.begin(), keep.end(), true)); }
@@ -306,11 +307,13 @@ bool RimFitter::step(const Picture& picture, Vec2 px, const Colour& weights, con
     done.keep[ray] = whole[ray] && (*keep)[ray];
   }
   done.radius = {0.0, kRadiusPull};
-  if (other != nullptr && count(done.keep) < count(other->keep)) {
-    done.radius = {other->move[2], kAlikePull};
-  }
   const int tries = keep == nullptr ? 2 : 1;
-  const std::optional<Move> move = robust(done.rows, done.shift, whole, done.radius, tries, done.keep);
+  std::optional<Move> move = robust(done.rows, done.shift, whole, done.radius, tries, done.keep);
+  const bool less = move && other != nullptr && count(done.keep) < count(other->keep);
+  if (less && std::abs((*move)[2] - other->move[2]) < kAlikeMax) {
+    done.radius = {other->move[2], kAlikePull};
+    move = robust(done.rows, done.shift, whole, done.radius, tries, done.keep);
+  }
   if (move) {
     done.move = *move;
   }
