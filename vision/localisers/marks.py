@@ -33,10 +33,13 @@ Array = NDArray[np.float64]
 SHARE_MIN = 0.4
 # So little of a rim is enough where it has the known radius within so much.
 SHARE_SURE_MIN, GROWTH_SURE = 0.33, 0.03
-GROWTH_MAX = 0.12  # of a rim that is seen whole
+GROWTH_MAX = 0.12  # of a rim that is seen whole; less of one
+GROWTH_CUT = 0.4
 GROWTH_DOUBT = 0.5  # more where the rim is rough: noise, blur longer than the profiles
-RESIDUAL_MAX = 0.09  # of the radius
-RESIDUAL_FREE_PX = 0.25  # sensor noise
+RESIDUAL_MAX = (
+    0.09  # of the radius, for a rim that is seen whole: blur; a cover leaves the rest sharp
+)
+RESIDUAL_FREE_DN = 10.5  # px at a contrast of 1 DN: a sensor's noise
 DISTANCE_TOLERANCE = 0.04
 # Squares of the same width are four-cornered by 0.5 to 0.9 on average of both, discs to 0.6. What is left
 # out of a square's rim are its corners: less is enough where both rims, or one, are not whole.
@@ -252,10 +255,13 @@ class MarkLocaliser:
         least = SHARE_SURE_MIN if abs(disc.growth) <= GROWTH_SURE else SHARE_MIN
         if disc.share < least:
             return f"{disc.share:.0%} of its rim seen, limit {least:.0%}"
-        most = GROWTH_MAX * disc.share + GROWTH_DOUBT * disc.residual_px / disc.radius_px
+        most = (
+            GROWTH_MAX * (GROWTH_CUT + (1.0 - GROWTH_CUT) * disc.share)
+            + GROWTH_DOUBT * disc.residual_px / disc.radius_px
+        )
         if not abs(disc.growth) <= most:
             return f"{1.0 + disc.growth:.2f} of its size, limit 1 +- {most:.2f}"
-        most_px = RESIDUAL_FREE_PX + RESIDUAL_MAX * disc.radius_px
+        most_px = _free_px(disc) + RESIDUAL_MAX * disc.share**2 * disc.radius_px
         if not disc.residual_px <= most_px:
             return f"rim off by {disc.residual_px:.2f} px RMS, limit {most_px:.2f} px"
         if not disc.ground_ratio <= self._ground_ratio_max:
@@ -335,7 +341,12 @@ def _square(discs: Marks) -> bool:
 
 def _rough_px(disc: Disc) -> float:
     """Return how far a rim is off its disc beyond a sensor's noise, RMS."""
-    return math.sqrt(max(disc.residual_px**2 - RESIDUAL_FREE_PX**2, 0.0))
+    return math.sqrt(max(disc.residual_px**2 - _free_px(disc) ** 2, 0.0))
+
+
+def _free_px(disc: Disc) -> float:
+    """Return how far a noisy sensor's rim is off its disc, RMS: the paler the disc, the more."""
+    return RESIDUAL_FREE_DN / max(disc.contrast_dn, 1.0)
 
 
 def _area_px(disc: Disc) -> float:
