@@ -21,6 +21,7 @@ constexpr double kStepShare = 0.3;
 constexpr double kShiftShare = 0.8;
 constexpr double kResponseMinDn = 6.0;
 constexpr double kGainMin = 0.02;
+constexpr double kBlurredMore = 1.15;
 // Ground within so many deviations of that round most of the disc is the same ground and noise; what is
 // beyond may be another thing. Noise of a ray is that between rays so far apart that they share no pixels.
 constexpr double kUsualSpreads = 3.0;
@@ -266,7 +267,9 @@ Edges Profiles::edges(const std::vector<float>& response) const {
       const double scatter = 2.0 * edge_[k] * std::sqrt(0.5 / edge_[k] + 0.5 / level_[k]);
       const double moved = edge_[k] * lengths[k].strange[ray];
       const double noise = std::hypot(scatter, moved) / lengths[k].level[ray];
-      if (gain / noise > most) {
+      // The last is for blurred rims alone: its levels do not follow light that falls to one side.
+      const double least = k == kLengths - 1 ? kBlurredMore * most : most;
+      if (gain / noise > least) {
         most = gain / noise;
         best[ray] = k;
         found.gain[ray] = gain;
