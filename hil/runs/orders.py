@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from hil.core.registry import Entry
     from hil.core.types import Estimate, OuterCommand, OuterLaw, ReferenceState, Vec2
     from hil.record.timeline import Timeline
-    from hil.runs.execute import RunSpec
+    from hil.runs.spec import RunSpec
     from hil.wire.link import BoardLink, Procedure
 
 Order = Mapping[str, Any]

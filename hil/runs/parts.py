@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
+from hil.analysis.metrics import LinkStats
 from hil.runs.orders import NoOrders, Orders
 
 if TYPE_CHECKING:
@@ -14,7 +15,8 @@ if TYPE_CHECKING:
     from hil.core.clocks import CameraClock
     from hil.core.rig import Rig
     from hil.core.types import Estimate, Estimator, OuterLaw, ReferenceState
-    from hil.record.memory import RunSink
+    from hil.record.memory import OpenRecord, RunSink
+    from hil.record.reader import RunRecord
     from hil.record.timeline import Timeline
     from hil.wire.link import BoardLink
     from vision.looking import Looker
@@ -48,6 +50,22 @@ class Ending:
 
     outcome: Literal["complete", "fault", "interrupted"]
     detail: str = ""
+
+
+def closed(record: OpenRecord, ending: Ending, link: BoardLink | None) -> RunRecord:
+    """Close the record of a run that ended so; `link` counted its frames, None where there was none yet."""
+    return record.close(ending.outcome, ending.detail, link_stats(link) if link else None)
+
+
+def link_stats(link: BoardLink) -> LinkStats:
+    """Return the counters of the host's end of the link."""
+    counters = link.counters
+    return LinkStats(
+        frames_sent=link.frames_sent,
+        frames_received=counters.frames,
+        frames_lost=counters.lost,
+        bytes_rejected=counters.skipped_bytes,
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -179,13 +179,13 @@ def test_a_folder_that_goes_away_while_the_record_is_closed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str
 ) -> None:
     """Whatever finds it gone, and whatever that raises, it is told as what it is."""
-    then = getattr(recorder, step)
+    then = getattr(closing, step)
 
     def gone(*arguments: object) -> object:
         shutil.rmtree(tmp_path / "run", ignore_errors=True)
         return then(*arguments)
 
-    monkeypatch.setattr(recorder, step, gone)
+    monkeypatch.setattr(closing, step, gone)
     with pytest.raises(RecordFault, match="cannot be written any more"):
         execute(replace(spec(tmp_path / "run"), rerun=True))
     assert not (tmp_path / "run").exists()

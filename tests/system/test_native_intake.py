@@ -25,7 +25,7 @@ from hil.rigs.opening import open_rig
 from hil.runs import intake
 from hil.runs.assembly import make_parts
 from hil.runs.execute import execute_in_memory
-from hil.runs.law_guard import make_law
+from hil.runs.assembly import make_law
 from hil.runs.provenance import make_manifest, used_things
 from hil.runs.session import Session
 from hil.runs.spec import RunSpec

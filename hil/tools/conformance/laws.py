@@ -23,7 +23,8 @@ from hil.core.types import OuterCommand, OuterLaw
 from hil.record.reader import RunRecord
 from hil.record.schema import LAW_COLUMNS, own_columns
 from hil.runs.execute import RunSpec, execute_in_memory
-from hil.runs.law_guard import STEP_MAX_S, make_law
+from hil.control.laws.guard import STEP_MAX_S
+from hil.runs.assembly import make_law
 from hil.tools.conformance.floor import Episode, episodes, mirrored
 from hil.tools.conformance.report import Checks, Named, Report, Violation, entry_of
 from hil.tools.conformance.watch import Heard, require_no_clock, require_no_random, watch
