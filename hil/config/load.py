@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 
 from hil.config.fields import told
 from hil.config.gains import shipped_gains
-from hil.config.limits import board_defaults, check_board
+from hil.config.limits import board_defaults
 from hil.config.own_settings import BY_NAME_KEY, PLACES, model_at, renew
 from hil.config.path_file import fill_path
 from hil.config.robot import RobotConfig
@@ -54,10 +54,7 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
     _fill_board(tree)
     _lay_over_shipped_gains(tree)
     scenario = build(Scenario, tree, name_or_path)
-    if overrides:
-        return with_overrides(scenario, overrides)
-    check_board(scenario.board)
-    return scenario
+    return with_overrides(scenario, overrides)
 
 
 def _lay_over_shipped_gains(tree: Tree) -> None:
@@ -84,9 +81,7 @@ def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
         if text not in files_named:
             set_value(tree, text)
     _fill_board(tree)
-    changed = build(Scenario, tree, "--set")
-    check_board(changed.board)
-    return changed
+    return build(Scenario, tree, "--set")
 
 
 def _part_of(text: str) -> str | None:

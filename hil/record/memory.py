@@ -43,15 +43,6 @@ class RunSink(Protocol):
         """Take who the board said it is."""
 
 
-class OpenRecord(RunSink, Protocol):
-    """A record of one run, in a folder or in memory, until it is closed."""
-
-    def close(
-        self, outcome: Outcome, detail: str = "", link: metrics.LinkStats | None = None
-    ) -> RunRecord:
-        """Finish it and return the run; raises RecordFault where it cannot be finished."""
-
-
 class Rows:
     """A table as one typed array, 8 bytes a value: a tuple of numbers takes four times that."""
 

@@ -58,8 +58,13 @@ class Recorder:
         try:
             keep_texts(out_dir, manifest.plugins)
             write_manifest(out_dir, manifest)
-            self._samples = Journal(keeping.open(layout.SAMPLES_JOURNAL), manifest.sample_names)
-            self._frames = Journal(keeping.open(layout.FRAMES_JOURNAL), FRAME_NAMES)
+            self._samples, self._frames = (
+                Journal(keeping.open(name), columns)
+                for name, columns in (
+                    (layout.SAMPLES_JOURNAL, manifest.sample_names),
+                    (layout.FRAMES_JOURNAL, FRAME_NAMES),
+                )
+            )
             self._link = keeping.open(layout.LINK)
             self._events = keeping.open(layout.EVENTS)
             self.tape = TapeWriter(keeping.open(layout.TAPE))

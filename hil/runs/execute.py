@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import cv2
 
 from hil.config.fit import board_parameters, check_fit
+from hil.control.laws.making import law_and_gains, make_law
 from hil.core.registry import in_one_line
 from hil.record.memory import MemoryRecorder
 from hil.record.recorder import Recorder
 from hil.record.tape import TapedRig
 from hil.rigs.opening import open_rig
-from hil.runs.assembly import make_law, make_live_law, make_parts, ordered
+from hil.runs.assembly import make_parts
 from hil.runs.interruption import CtrlC
-from hil.runs.orders import with_orders
+from hil.runs.orders import ordered, with_orders
 from hil.runs.outside import fault_of
 from hil.runs.parts import Ending, Progress, Publish, closed
 from hil.runs.provenance import Used, make_manifest, used_things
@@ -49,8 +50,8 @@ class Checked(NamedTuple):
 
 def checked(spec: RunSpec) -> Checked:
     """Return what follows from a spec; raises BadInput where its values cannot work together."""
-    check_fit(spec.scenario)
     parameters = board_parameters(spec.scenario, spec.inner)
+    check_fit(spec.scenario)
     used = used_things(spec)
     return Checked(parameters, used, make_manifest(spec, parameters, used))
 
@@ -74,9 +75,7 @@ def execute(
     """
     cv2.setNumThreads(1)  # search windows are small: handing them to threads costs more
     parameters, used, manifest = checked(spec)
-    law, live = make_law(spec.outer, spec.scenario), None
-    if orders is not None:
-        law, live = make_live_law(spec.outer, spec.scenario)
+    law, live = law_and_gains(spec.outer, spec.scenario, live=orders is not None)
     rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
     ctrl_c = CtrlC()
     try:
@@ -92,7 +91,7 @@ def execute(
             taped = TapedRig(rig, recorder.tape, ctrl_c.obey)
             sink = recorder if watch is None else WatchedSink(recorder, watch)
             parts: Parts | None = None
-            error: Exception | None = None
+            error: Exception | SystemExit | None = None
             try:
                 parts = make_parts(spec, taped, sink, law)
                 if orders is not None:
@@ -107,7 +106,10 @@ def execute(
             except KeyboardInterrupt as stop:  # pressed again, while the robot was being stopped
                 ending = Ending("interrupted", str(stop) or "Ctrl-C")
             except Exception as failed:
-                ending, error = Ending("fault", in_one_line(failed)), fault_of(failed, used) or failed
+                ending, error = (
+                    Ending("fault", in_one_line(failed)),
+                    fault_of(failed, used) or failed,
+                )
             ctrl_c.close()  # from now on signals wait for the record
             record = closed(recorder, ending, parts.link if parts is not None else None)
         if error is not None:
@@ -118,7 +120,7 @@ def execute(
         rig.close()
 
 
-def _conducted(session: Session, used: Used) -> tuple[Ending, Exception | None]:
+def _conducted(session: Session, used: Used) -> tuple[Ending, Exception | SystemExit | None]:
     """Run the session to its end; return that, and an error of the harness itself that ended it."""
     try:
         ending = session.run()

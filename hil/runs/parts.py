@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 from hil.analysis.metrics import LinkStats
+from hil.record.memory import RunSink
 from hil.runs.orders import NoOrders, Orders
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from hil.core.clocks import CameraClock
     from hil.core.rig import Rig
     from hil.core.types import Estimate, Estimator, OuterLaw, ReferenceState
-    from hil.record.memory import OpenRecord, RunSink
+    from hil.record.manifest import Outcome
     from hil.record.reader import RunRecord
     from hil.record.timeline import Timeline
     from hil.wire.link import BoardLink
@@ -52,13 +53,20 @@ class Ending:
     detail: str = ""
 
 
+class OpenRecord(RunSink, Protocol):
+    """A record of one run, in a folder or in memory, until it is closed."""
+
+    def close(self, outcome: Outcome, detail: str = "", link: LinkStats | None = None) -> RunRecord:
+        """Finish it and return the run; raises RecordFault where it cannot be finished."""
+
+
 def closed(record: OpenRecord, ending: Ending, link: BoardLink | None) -> RunRecord:
     """Close the record of a run that ended so; `link` counted its frames, None where there was none yet."""
-    return record.close(ending.outcome, ending.detail, link_stats(link) if link else None)
+    stats = _stats(link) if link is not None else None
+    return record.close(ending.outcome, ending.detail, stats)
 
 
-def link_stats(link: BoardLink) -> LinkStats:
-    """Return the counters of the host's end of the link."""
+def _stats(link: BoardLink) -> LinkStats:
     counters = link.counters
     return LinkStats(
         frames_sent=link.frames_sent,

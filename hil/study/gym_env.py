@@ -181,9 +181,7 @@ class _Episode:
         self.seed = spec.seed
         self._cost = cost
         parameters, _, manifest = checked(spec)
-        self._recorder = MemoryRecorder(
-            manifest.model_copy(update={"outer": OUTER, "plugins": []})
-        )
+        self._recorder = MemoryRecorder(manifest.model_copy(update={"outer": OUTER, "plugins": []}))
         self._law = GivenCommand()
         self._rig: Rig = open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
         self._parts: Parts = make_parts(spec, self._rig, self._recorder, self._law)

@@ -18,7 +18,7 @@ import pytest
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput, HilError, RecordFault, RigFault, Stopped
 from hil.core.files import unwritable
-from hil.record import recorder
+from hil.record import closing
 from hil.record.manifest import write_manifest
 from hil.record.reader import read_run
 from hil.record.recorder import Recorder

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from hil.core.errors import BadInput
-from hil.record.tlog import log_entry, install_dialect, read_tlog
-from hil.record.writing import Keeping
+from hil.record.tlog import install_dialect, log_entry, read_tlog
 from hil.wire import dialect
 
 START_US = 1_714_557_600_000_000

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from hil.board.wheel_laws import WHEEL_LAWS
 from hil.config.fit import board_parameters
 from hil.config.load import load_scenario
+from hil.control.laws.making import make_law
 from hil.core import _native as core_native
 from hil.core.clocks import CameraClock
 from hil.record.memory import MemoryRecorder
@@ -25,7 +26,6 @@ from hil.rigs.opening import open_rig
 from hil.runs import intake
 from hil.runs.assembly import make_parts
 from hil.runs.execute import execute_in_memory
-from hil.runs.assembly import make_law
 from hil.runs.provenance import make_manifest, used_things
 from hil.runs.session import Session
 from hil.runs.spec import RunSpec

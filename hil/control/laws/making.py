@@ -1,24 +1,35 @@
-"""An outer law made ready for a run: guarded where it comes from outside, at rest at its goal, in its limits."""
+"""An outer law made ready for a run: guarded where it comes from outside, and at rest at its goal."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from hil.control.laws.axes import in_axes
 from hil.control.laws.guard import GuardedLaw
 from hil.control.laws.hold import HoldAtGoal
-from hil.control.laws.let_go import LetGo
-from hil.control.laws.turn_first import TurnFirst
-from hil.control.laws.within import WithinWheelSpeed
+from hil.control.laws.retuned import RetunedLaw
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import BUILT_IN
 
 if TYPE_CHECKING:
-    from hil.config.control import ControlConfig, OuterLimits
+    from hil.config.control import OuterLimits
     from hil.config.gains import Gains
-    from hil.control.vehicles.vehicle import Vehicle
+    from hil.config.scenario import Scenario
     from hil.core.registry import Entry
     from hil.core.types import OuterLaw
+
+
+def make_law(outer: str, scenario: Scenario) -> OuterLaw:
+    """Return the outer law of a run; raises as `make_outer_law`."""
+    return law_and_gains(outer, scenario, live=False)[0]
+
+
+def law_and_gains(
+    outer: str, scenario: Scenario, *, live: bool
+) -> tuple[OuterLaw, RetunedLaw | None]:
+    """Return the outer law of a run, and what changes its gains where they are `live`; raises as above."""
+    control, d0_m = scenario.control, scenario.robot.d0_m
+    return _ready(OUTER_LAWS.get(outer), control.active_gains, control.limits, d0_m, live=live)
 
 
 def make_outer_law(name: str, gains: Gains, limits: OuterLimits, d0_m: float) -> OuterLaw:
@@ -26,30 +37,23 @@ def make_outer_law(name: str, gains: Gains, limits: OuterLimits, d0_m: float) ->
 
     Raises BadInput when there is no such law, RigFault for one from outside that fails while it is made.
     """
-    entry = OUTER_LAWS.get(name)
-    law = bare_law(entry, gains.of(entry), limits, d0_m)
-    return at_rest(entry, law, limits)
+    return _ready(OUTER_LAWS.get(name), gains, limits, d0_m, live=False)[0]
 
 
-def bare_law(entry: Entry, gains: Any, limits: OuterLimits, d0_m: float) -> OuterLaw:
-    """Return the law with these gains, without the rest at the goal; raises as `make_outer_law`."""
-    if entry.origin == BUILT_IN:
-        law: OuterLaw = entry.factory(gains, limits, d0_m)
-        return law
-    return GuardedLaw(entry, lambda: entry.factory(gains, limits, d0_m), limits)
-
-
-def at_rest(entry: Entry, law: OuterLaw, limits: OuterLimits) -> OuterLaw:
-    """Return the law with the rest at the goal, if it wants that."""
+def _ready(
+    entry: Entry, gains: Gains, limits: OuterLimits, d0_m: float, *, live: bool
+) -> tuple[OuterLaw, RetunedLaw | None]:
+    own = gains.of(entry)
+    make = partial(_bare, entry=entry, limits=limits, d0_m=d0_m)
+    retuned = RetunedLaw(own, make) if live else None
+    law = retuned or make(own)
     rests = entry.origin == BUILT_IN or bool(entry.extra.get("hold", True))
-    return HoldAtGoal(law, limits) if rests else law
+    return HoldAtGoal(law, limits) if rests else law, retuned
 
 
-def limited(
-    law: OuterLaw, control: ControlConfig, vehicle: Vehicle, wheel_speed_max_rad_s: float
-) -> OuterLaw:
-    """Return the law in its axes, under what holds for every law on this vehicle."""
-    law = in_axes(law, control.axes_rad)
-    law = WithinWheelSpeed(law, vehicle, wheel_speed_max_rad_s)
-    law = TurnFirst(law, control.limits.turn_missing_rad_s)
-    return LetGo(law, vehicle, control.limits.let_go_rad_s)
+def _bare(own: Any, entry: Entry, limits: OuterLimits, d0_m: float) -> OuterLaw:
+    """Return the law with gains of its own kind, guarded where it comes from outside."""
+    if entry.origin == BUILT_IN:
+        law: OuterLaw = entry.factory(own, limits, d0_m)
+        return law
+    return GuardedLaw(entry, lambda: entry.factory(own, limits, d0_m), limits)
