@@ -14,7 +14,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
@@ -153,27 +153,6 @@ class SteppedReference:
         if not inside:
             raise BadInput(f"step to ({x:.3f}, {y:.3f}) m: not within {ROOM_M:g} m of the fence")
         self._shift = (self._shift[0] + x_m, self._shift[1] + y_m)
-
-
-class Orders(Protocol):
-    """What a session asks for orders."""
-
-    def hold(self) -> bool:
-        """Return whether the robot is to be kept at rest still, before it is armed."""
-
-    def at_tick(self, reference: ReferenceState, estimate: Estimate) -> None:
-        """Take what was ordered since the tick before."""
-
-
-class NoOrders:
-    """Nobody orders anything."""
-
-    def hold(self) -> bool:
-        """Return False."""
-        return False
-
-    def at_tick(self, reference: ReferenceState, estimate: Estimate) -> None:
-        """Do nothing."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Literal, Protocol
 
 from hil.analysis.metrics import LinkStats
 from hil.record.memory import RunSink
-from hil.runs.orders import NoOrders, Orders
 
 if TYPE_CHECKING:
     from hil.control.references import Reference
@@ -25,6 +24,27 @@ if TYPE_CHECKING:
 Progress = Callable[[float], None]
 # Takes host time, state of the robot, and whether it is armed, once a tick.
 Publish = Callable[[float, "Estimate", bool], None]
+
+
+class Orders(Protocol):
+    """What a session asks for orders."""
+
+    def hold(self) -> bool:
+        """Return whether the robot is to be kept at rest still, before it is armed."""
+
+    def at_tick(self, reference: ReferenceState, estimate: Estimate) -> None:
+        """Take what was ordered since the tick before."""
+
+
+class NoOrders:
+    """Nobody orders anything."""
+
+    def hold(self) -> bool:
+        """Return False."""
+        return False
+
+    def at_tick(self, reference: ReferenceState, estimate: Estimate) -> None:
+        """Do nothing."""
 
 
 @dataclass(frozen=True, slots=True)
