@@ -18,11 +18,11 @@ from hil.cli.options import (
     json_option,
     out_option,
     outer_option,
-    plain_console,
     print_json,
     seed_option,
     set_option,
     target_option,
+    tell,
     with_figures,
 )
 from hil.cli.progress import run_progress
@@ -159,24 +159,21 @@ def _finite(value: float) -> float | None:
 
 def print_summary(record: RunRecord) -> None:
     """Write outcome, requirements and the place of the record to stdout."""
-    from rich.text import Text
-
-    console = plain_console()
     manifest = record.manifest
     line = (
         f"{manifest.scenario_name} on {manifest.target}, outer {manifest.outer}, "
         f"inner {manifest.inner}, seed {manifest.seed}: {manifest.outcome}"
     )
-    console.print(visible(line + said(manifest.outcome_detail)))
+    tell(visible(line + said(manifest.outcome_detail)))
     for item in record.verdicts():
-        mark = ("holds", "green") if item.holds else ("FAILS", "red")
+        mark = click.style("holds", "green") if item.holds else click.style("FAILS", "red")
         is_now = f"is {item.value:.4g}" if math.isfinite(item.value) else "has no value in this run"
-        console.print(Text.assemble("  ", mark, f"  {item.text()}   ({is_now})"))
+        tell(f"  {mark}  {item.text()}   ({is_now})")
     for note in manifest.notes:
-        console.print(Text.assemble(("note:", "yellow"), f" {visible(note)}"))
+        tell(f"{click.style('note:', 'yellow')} {visible(note)}")
     for text in record.diagnoses():
-        console.print(Text.assemble(("diagnosis:", "yellow"), f" {visible(text)}"))
-    console.print(f"record: {visible(str(record.path))}")
+        tell(f"{click.style('diagnosis:', 'yellow')} {visible(text)}")
+    tell(f"record: {visible(str(record.path))}")
 
 
 def said(detail: str) -> str:
