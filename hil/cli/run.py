@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,6 +78,7 @@ def command(
     """
     from hil.config.load import load_scenario
     from hil.core.registries import OUTER_LAWS
+    from hil.record.beside import ViewerFile
     from hil.record.manifest import command_line
     from hil.runs.execute import RunSpec, camera_for, execute, exit_status, new_folder
 
@@ -99,11 +100,14 @@ def command(
         command=command_line(),
     )
     with (
+        ViewerFile() if spec.is_simulated else nullcontext() as viewer,
         junit_file(junit, f"{resolved.name}.{law.name}"),
         run_progress({resolved.name: resolved.duration_s}) as update,
         _ground_stations(bridge) as publish,
     ):
-        record = execute(spec, lambda t_s: update(resolved.name, t_s), publish=publish)
+        record = execute(
+            spec, lambda t_s: update(resolved.name, t_s), publish=publish, viewer=viewer
+        )
     tell_ci([record], f"hil run {resolved.name}", junit=junit)
     if as_json:
         print_json(summary(record))

@@ -18,11 +18,12 @@ from hil.record.schema import FRAME_COLUMNS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from hil.record.beside import ViewerFile
     from hil.record.schema import Column
     from hil.record.writing import Keeping
 
 
-def finish(keeping: Keeping, ended: Manifest, *, rerun: bool) -> RunRecord:
+def finish(keeping: Keeping, ended: Manifest, viewer: ViewerFile | None) -> RunRecord:
     """Turn what was written into the finished record of `ended`; its files are closed already.
 
     Raises OSError and RecordFault for what cannot be written, and whatever a figure of one's own or a folder
@@ -40,10 +41,8 @@ def finish(keeping: Keeping, ended: Manifest, *, rerun: bool) -> RunRecord:
         pictures=read_pictures(folder / layout.PICTURES),
     ).with_own_figures()
     _write_figures(run)
-    if rerun:
-        from hil.record.rrd import write_rrd  # noqa: PLC0415 - half a second, only when used
-
-        write_rrd(folder / layout.RERUN, [run])
+    if viewer is not None:
+        viewer.write(run)
     keeping.release()
     return _seal(run)
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from hil.analysis import metrics
 from hil.core.errors import RecordFault
 from hil.record import layout
+from hil.record.beside import ViewerFile
 from hil.record.camera import CameraKeeper
 from hil.record.closing import finish, give_up
 from hil.record.journal import Journal
@@ -50,10 +51,11 @@ class Recorder:
         small_video: bool = False,
         frame_rate_hz: float = 30.0,
         rerun: bool = True,
+        viewer: ViewerFile | None = None,
     ) -> None:
         self.path = out_dir
         self._manifest = manifest
-        self._rerun = rerun
+        self._viewer = (viewer or ViewerFile()) if rerun else None
         self._keeping = keeping = Keeping.of_new_folder(out_dir)
         try:
             keep_texts(out_dir, manifest.plugins)
@@ -159,7 +161,7 @@ class Recorder:
             self._keeping.check(self.path / layout.MANIFEST)
             self._stop_writers()
             if self._keeping.fault is None:
-                return finish(self._keeping, ended, rerun=self._rerun)
+                return finish(self._keeping, ended, self._viewer)
         except OSError as error:
             self._keeping.fail(error)
         except RecordFault:

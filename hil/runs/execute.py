@@ -27,6 +27,7 @@ from hil.wire.identity import board_hashes
 if TYPE_CHECKING:
     from hil.core.rig import Rig
     from hil.core.types import OuterLaw
+    from hil.record.beside import ViewerFile
     from hil.record.manifest import Manifest
     from hil.record.reader import RunRecord
     from hil.runs.orders import OrderSource
@@ -63,6 +64,7 @@ def execute(
     publish: Publish | None = None,
     watch: Watch | None = None,
     orders: OrderSource | None = None,
+    viewer: ViewerFile | None = None,
 ) -> RunRecord:
     """Run the spec and return its closed record; raises BadInput before anything is written.
 
@@ -72,6 +74,7 @@ def execute(
 
     `rig` is another one than the spec's target names; it is closed here. `publish` is given the
     estimate of every tick, `watch` everything that the record is given, after it; `orders` are an operator's.
+    `viewer` writes the viewer's file, beside the run where it has been entered.
     """
     cv2.setNumThreads(1)  # search windows are small: handing them to threads costs more
     parameters, used, manifest = checked(spec)
@@ -87,6 +90,7 @@ def execute(
                 small_video=spec.small_video,
                 frame_rate_hz=spec.scenario.camera.rate_hz,
                 rerun=spec.rerun,
+                viewer=viewer,
             )
             taped = TapedRig(rig, recorder.tape, ctrl_c.obey)
             sink = recorder if watch is None else WatchedSink(recorder, watch)
