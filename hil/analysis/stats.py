@@ -258,7 +258,9 @@ def adjusted(difference: Sequence[float], covariate: Sequence[float]) -> Adjuste
     if y.size < 4 or np.ptp(x) == 0.0:
         return None
     fit = scipy.stats.linregress(x, y)
-    reach = float(scipy.stats.t.ppf(0.5 + 0.5 * CONFIDENCE, y.size - 2)) * float(fit.intercept_stderr)
+    reach = float(scipy.stats.t.ppf(0.5 + 0.5 * CONFIDENCE, y.size - 2)) * float(
+        fit.intercept_stderr
+    )
     middle = float(fit.intercept)
     return Adjusted(middle, Interval(middle - reach, middle + reach), float(fit.slope))
 
