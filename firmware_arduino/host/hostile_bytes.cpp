@@ -106,6 +106,12 @@ class Rig {
     for (uint16_t at = 0; at < size;) {
       at = static_cast<uint16_t>(
           at + hil::board_receive(board, bytes.data() + at, static_cast<uint16_t>(size - at), t_us));
+      hash_all();
+    }
+  }
+
+  void hash_all() {
+    while (hil::board_idle(board)) {
     }
   }
 
@@ -115,6 +121,7 @@ class Rig {
     hil::StoredByte byte;
     hil::board_store(board, byte);
     hil::board_slack(board);
+    hash_all();
     t_us += hil::TICK_US;
     const bool armed = board.safety.state == HIL_STATE_ARMED;
     if (!armed && (out.pwm_left != 0 || out.pwm_right != 0)) fail("wheels driven while not armed");
