@@ -61,7 +61,7 @@ def execute(
     check_fit(spec.scenario)
     parameters = board_parameters(spec.scenario, spec.inner)
     law = make_law(spec.outer, spec.scenario)
-    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
+    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed, spec.key)
     used = used_things(spec)
     manifest = make_manifest(spec, parameters, used)
     ctrl_c = CtrlC()
@@ -126,7 +126,7 @@ def execute_in_memory(
     check_fit(spec.scenario)
     parameters = board_parameters(spec.scenario, spec.inner)
     law = law or make_law(spec.outer, spec.scenario)
-    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
+    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed, spec.key)
     used = used_things(spec)
     try:
         recorder = MemoryRecorder(make_manifest(spec, parameters, used))

@@ -41,6 +41,7 @@ class ReadCounters:
     bad_crc: int
     skipped_bytes: int
     foreign: int
+    signed_frames: int
 
 class FrameReader:
     counters: ReadCounters

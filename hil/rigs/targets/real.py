@@ -20,4 +20,4 @@ def serial(asked: Asked) -> Rig:
     from hil.rigs.serial import SerialRig, parse_target  # noqa: PLC0415
 
     device, baud = parse_target(f"serial:{asked.where}")
-    return SerialRig(device, baud, open_source(asked.camera, asked.scenario.camera))
+    return SerialRig(device, baud, open_source(asked.camera, asked.scenario.camera), asked.key)

@@ -119,7 +119,8 @@ void bind_link(nb::module_& m) {
       .def_ro("lost", &ReadCounters::lost)
       .def_ro("bad_crc", &ReadCounters::bad_crc)
       .def_ro("skipped_bytes", &ReadCounters::skipped_bytes)
-      .def_ro("foreign", &ReadCounters::foreign);
+      .def_ro("foreign", &ReadCounters::foreign)
+      .def_ro("signed_frames", &ReadCounters::signed_frames);
   nb::class_<FrameReader>(m, "FrameReader")
       .def(nb::init<std::uint8_t>(), "system"_a)
       .def("feed", &fed, "data"_a)
