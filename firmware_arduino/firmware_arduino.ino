@@ -85,7 +85,8 @@ void setup() { start(); }
 
 void loop() {
   sleep_until_work();
-  host_port::pump(g_board);
+  // A slice may have taken long, and bytes may have waited for it: a tick that is due waits for no more.
+  if (!g_hashing || ticker::count() == g_ticks_done) host_port::pump(g_board);
   const uint8_t now = ticker::count();
   if (now == g_ticks_done) {
     g_hashing = board_idle(g_board);

@@ -106,9 +106,10 @@ bool take_frame(Board& b, uint32_t t_us) {
   return signer.waiting;
 }
 
-void act_on_checked(Board& b, bool good) {
+void act_on_checked(Board& b) {
   Signer& signer = b.link.signer;
-  if (!good) return refuse_frame(b, Text::SIGNED_OTHERWISE);
+  signer.job = HashJob::NONE;
+  signer.waiting = false;
   // One that lies too far ahead comes again: its sender's stamp is stored first.
   if (signer_take(signer, link_sender(b.link))) protocol_handle(b, signer.arrived_us);
 }
@@ -158,12 +159,18 @@ bool board_idle(Board& b) {
   Signer& signer = b.link.signer;
   if (signer.job == HashJob::NONE && !link_begin_hash(b.link)) return false;
   const HashJob job = signer.job;
+  if (job == HashJob::ACT) {
+    act_on_checked(b);
+    return true;
+  }
   uint8_t signature[SIGNATURE_SIZE];
   if (!signer_slice(signer, signature)) return true;
   if (job == HashJob::SIGN) {
     link_signed(b.link, signature);
+  } else if (link_checked(b.link, signature)) {
+    signer.job = HashJob::ACT;  // in a call of its own: a tick may be due
   } else {
-    act_on_checked(b, link_checked(b.link, signature));
+    refuse_frame(b, Text::SIGNED_OTHERWISE);
   }
   return true;
 }

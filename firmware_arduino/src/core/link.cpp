@@ -126,10 +126,10 @@ bool link_begin_hash(Link& link) {
 }
 
 bool link_checked(Link& link, const uint8_t (&signature)[SIGNATURE_SIZE]) {
-  link.signer.waiting = false;
   uint8_t differs = 0;
   for (uint8_t i = 0; i < SIGNATURE_SIZE; ++i) differs |= signature[i] ^ link.rx.signature[HASHED_TAIL + i];
-  return differs == 0;
+  link.signer.waiting = differs == 0;
+  return link.signer.waiting;
 }
 
 void link_signed(Link& link, const uint8_t (&signature)[SIGNATURE_SIZE]) {

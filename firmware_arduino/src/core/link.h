@@ -42,7 +42,7 @@ void link_send(Link& link, const mavlink_message_t& message, uint8_t room);
 Sender link_sender(const Link& link);
 // Starts the next hash there is: of the frame that waits for its check, else of the next to be sent.
 bool link_begin_hash(Link& link);
-// The frame in link.rx has been looked at; true when its signature is this one.
+// True when this is the signature of the frame in link.rx, which then waits on to be acted on.
 bool link_checked(Link& link, const uint8_t (&signature)[SIGNATURE_SIZE]);
 // The signature of the next frame to be sent.
 void link_signed(Link& link, const uint8_t (&signature)[SIGNATURE_SIZE]);

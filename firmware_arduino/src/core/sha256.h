@@ -3,6 +3,7 @@
 #define HIL_CORE_SHA256_H
 
 #include <stdint.h>
+#include <string.h>
 
 namespace hil {
 
@@ -18,10 +19,12 @@ struct Sha256 {
   uint8_t round;           // to come next
 };
 
-// Four bytes, highest first.
+// Four bytes, highest first; board and host have the lowest first.
 inline uint32_t sha256_word(const uint8_t* bytes) {
-  return static_cast<uint32_t>(bytes[0]) << 24 | static_cast<uint32_t>(bytes[1]) << 16 |
-         static_cast<uint16_t>(bytes[2] << 8) | bytes[3];
+  const uint8_t turned[4] = {bytes[3], bytes[2], bytes[1], bytes[0]};
+  uint32_t word;
+  memcpy(&word, turned, 4);
+  return word;
 }
 
 void sha256_init(Sha256& s);

@@ -38,7 +38,7 @@ constexpr uint16_t BOARD_STORAGE_SIZE = STAMPS_AT + STAMP_SLOTS * STAMP_RECORD;
 static_assert(BOARD_STORAGE_SIZE <= 4096, "the EEPROM of the Mega 2560");
 
 enum class Signing : uint8_t { OFF, ON, LOCKED };  // LOCKED: what is stored of a key is damaged
-enum class HashJob : uint8_t { NONE, CHECK, SIGN };
+enum class HashJob : uint8_t { NONE, CHECK, SIGN, ACT };  // ACT: checked, and good
 enum class KeyWrite : uint8_t { NONE, KEY, WIPE, STAMP };
 
 struct Sender {
