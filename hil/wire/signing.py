@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from hil.wire import dialect
+from hil.wire import _wire, dialect
 
 KEY_BYTES = 32
 BLOCK_BYTES = 13
@@ -53,7 +53,7 @@ def flagged(frame: bytes, flags: int) -> bytes:
     """Return a frame with these incompatible flags and the checksum that belongs to them."""
     entry = dialect.mavlink_map[int.from_bytes(frame[7:10], "little")]
     body = frame[1:2] + bytes([flags]) + frame[3:-2]
-    crc = dialect.x25crc(body + bytes([entry.crc_extra])).crc
+    crc = _wire.checksum(body, entry.crc_extra)
     return bytes([_MARKER]) + body + crc.to_bytes(2, "little")
 
 
