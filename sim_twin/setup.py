@@ -52,8 +52,8 @@ def make_kernel(
     """Return robot and board at rest at the origin, with every event of the scenario loaded.
 
     `rng` draws what nobody sets: when the board was switched on, and the noise. `board` is the
-    handle of another board than the firmware core compiled for this machine, which is on the USB port where it
-    is `wired` and has `eeprom` in its storage.
+    handle of another board than the firmware core compiled for this machine, which is met on its USB
+    port where it is `wired`, and has `eeprom` in its storage.
     """
     clock_start_us = rng.randrange(2_000_000, 600_000_000)
     if board is None:

@@ -45,8 +45,8 @@ POSES_PER_READOUT = 17
 class TwinSetup:
     """All that the simulated rig is made of; `start` is the robot's pose at rest.
 
-    `eeprom` is what the board's storage holds at first, the rest of it erased; `wired` says that the host is on
-    the board's USB port, and not on its Bluetooth one.
+    `eeprom` is what the board's storage holds at first, the rest of it erased; `wired` says that the
+    host is on the board's USB port, and not on its Bluetooth one.
     """
 
     robot: RobotConfig

@@ -82,12 +82,14 @@ def key() -> None:
 @key.command("new")
 @click.argument("file", type=_FILE)
 @click.option("--passphrase", is_flag=True,
-              help="Ask for a passphrase and make the key of it as MAVProxy does; else it is drawn.")  # fmt: skip
+              help="Ask for a passphrase, and make the key of it as MAVProxy does.")  # fmt: skip
 def new_key(file: Path, passphrase: bool) -> None:
     """Write a new key to FILE, for you alone to read."""
     from hil.rigs import key_file
 
-    asked = click.prompt("passphrase", hide_input=True, confirmation_prompt=True) if passphrase else ""
+    asked = ""
+    if passphrase:
+        asked = click.prompt("passphrase", hide_input=True, confirmation_prompt=True)
     key_file.new_key(file, asked)
     click.echo(f"written: {visible(str(file))}; set it on a board: hil firmware key set")
 

@@ -53,7 +53,7 @@ figure_option = click.option(
 )  # fmt: skip
 key_option = click.option(
     "--key", "key_file", type=click.Path(path_type=Path), metavar="FILE",
-    help="Signing key of the board; a simulated one is given it.  [default for ports: the file named by HIL_KEY]",
+    help="Signing key of the board; a simulated one is given it.  [default for ports: HIL_KEY]",
 )  # fmt: skip
 out_option = click.option(
     "--out", type=click.Path(path_type=Path), metavar="DIR",

@@ -19,7 +19,11 @@ _REPEAT_S = 0.5
 # The board's port changes to the USB one after a second; a board that was reset starts within two more, and
 # storing takes a third of one.
 _MOST_S = 10.0
-_STORED, _ERASED, _REFUSED = "signing key stored", "signing key erased", ("key refused", "command refused")
+_STORED, _ERASED, _REFUSED = (
+    "signing key stored",
+    "signing key erased",
+    ("key refused", "command refused"),
+)
 # What is in force already is not stored again: that it is in force is seen in so many frames.
 _SURE_FRAMES = 75
 

@@ -68,7 +68,9 @@ class _Bench:
         eeprom = stored_key(key.secret, 0) if key else b""
         setup = TwinSetup(robot, link, CameraConfig(), Pose(0.0, 0.0, 0.0), 1, eeprom=eeprom)
         rig = self.rig = Pil(setup)
-        stream = SignedStream(rig.stream, key, lambda: round(1e5 * rig.now_s())) if key else rig.stream
+        stream = (
+            SignedStream(rig.stream, key, lambda: round(1e5 * rig.now_s())) if key else rig.stream
+        )
         self.link = BoardLink(stream)
         self.last: Any = None  # WHEEL_STATE
         parameters = {entry.name: entry.default for entry in _firmware.parameter_table()}

@@ -25,6 +25,9 @@ _MARKER, _FLAGS, _SIGNED = 0xFD, 2, 1
 _HEADER_BYTES, _OVERHEAD_BYTES, _STAMP_BYTES, _SIGNATURE_BYTES = 10, 12, 6, 6
 
 
+_DECODER = dialect.MAVLink(None)
+
+
 @dataclass(frozen=True, slots=True)
 class Key:
     """A secret key and what it is called in messages: the name of its file. It never shows its bytes."""
@@ -157,4 +160,4 @@ class FrameChecker:
 
     def _hear(self, frame: bytes) -> None:
         if int.from_bytes(frame[7:10], "little") == dialect.MAVLINK_MSG_ID_STATUSTEXT:
-            self.said = dialect.MAVLink(None).decode(bytearray(frame)).text
+            self.said = str(getattr(_DECODER.decode(bytearray(frame)), "text", ""))

@@ -187,8 +187,8 @@ void bind_kernel(nb::module_& m) {
             return out;
           },
           "angle_rad"_a, "t0_us"_a, "h_us"_a, "dead_a"_a = false, "dead_b"_a = false, "swapped"_a = false);
-  m.def("host_board", &host_board, "clock_ppm"_a, "clock_start_us"_a, "baud"_a,
-        "wired"_a = false, "eeprom"_a = nb::bytes("", 0));
+  m.def("host_board", &host_board, "clock_ppm"_a, "clock_start_us"_a, "baud"_a, "wired"_a = false,
+        "eeprom"_a = nb::bytes("", 0));
   nb::class_<Kernel>(m, "Kernel")
       .def("__init__", &make_kernel, "params"_a, "step_us"_a, "counts_per_turn"_a, "board"_a)
       .def("reset", &Kernel::reset, "x_m"_a, "y_m"_a, "theta_rad"_a)

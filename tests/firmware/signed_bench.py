@@ -46,9 +46,7 @@ class SignedBench(BoardBench):
     def __init__(self, eeprom: bytes | None = None, peer: Peer | None = None) -> None:
         self.peer = peer or Peer()
         super().__init__()
-        self.board = _firmware.Board(
-            _firmware.stored_key(KEY, STAMP) if eeprom is None else eeprom
-        )
+        self.board = _firmware.Board(_firmware.stored_key(KEY, STAMP) if eeprom is None else eeprom)
         self.tick(30)
 
     def send(self, message: Any) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 from collections.abc import Callable
 
 import pytest
@@ -12,7 +13,15 @@ from hypothesis import strategies as st
 from hil.board import _firmware
 from hil.wire import dialect
 from tests.firmware.bench import UINT32, BoardBench
-from tests.firmware.signed_bench import KEY, MINUTE, OTHER_KEY, STAMP, STORING_TICKS, Peer, SignedBench
+from tests.firmware.signed_bench import (
+    KEY,
+    MINUTE,
+    OTHER_KEY,
+    STAMP,
+    STORING_TICKS,
+    Peer,
+    SignedBench,
+)
 
 ACCEPTED = dialect.MAV_RESULT_ACCEPTED
 SETPOINT = dialect.MAVLink_wheel_setpoint_message(5.0, 5.0, 1000)
@@ -47,48 +56,48 @@ def test_any_digest(text):
 
 
 def state_of(bench: BoardBench) -> tuple:
-    """What an order could change."""
+    """Return what an order could change."""
     board = bench.board
     wheels = [(board.wheel(side).setpoint_rad_s, board.wheel(side).pwm) for side in (0, 1)]
     return board.state, board.reason, board.parameters, wheels, board.signs, board.eeprom[:640]
 
 
-def unsigned(bench: SignedBench, message) -> bytes:
-    """The frame as a host without the key sends it."""
+def unsigned(_: SignedBench, message) -> bytes:
+    """Return the frame as a host without the key sends it."""
     return bytes(message.pack(dialect.MAVLink(None, 255, 190)))
 
 
 def flipped(bench: SignedBench, message) -> bytes:
-    """One bit of the signature is another one."""
+    """Return the frame with another bit in its signature."""
     frame = bytearray(bench.peer.encode(message))
     frame[-3] ^= 0x10
     return bytes(frame)
 
 
 def other_key(bench: SignedBench, message) -> bytes:
-    """Signed, and new, but with another key."""
+    """Return it signed, and new, but with another key."""
     return Peer(OTHER_KEY, stamp=bench.peer.stamp + 10).encode(message)
 
 
 def older(bench: SignedBench, message) -> bytes:
-    """A time stamp before the last one of this sender."""
+    """Return it with a time stamp before the last one of this sender."""
     frame = Peer(stamp=bench.peer.stamp - 10).encode(message)
     bench.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     return frame
 
 
 def other_link(bench: SignedBench, message) -> bytes:
-    """Another link of the sender, more than a minute behind."""
+    """Return it from another link of the sender, more than a minute behind."""
     return Peer(link_id=3, stamp=bench.peer.stamp - MINUTE - 1000).encode(message)
 
 
 def zeros(bench: SignedBench, message) -> bytes:
-    """A signature of zeros."""
+    """Return it with a signature of zeros."""
     return bench.peer.encode(message)[:-6] + bytes(6)
 
 
 def moved(bench: SignedBench, message) -> bytes:
-    """The block of another frame."""
+    """Return it with the signature of another frame."""
     other = bench.peer.encode(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     return bench.peer.encode(message)[:-13] + other[-13:]
 
@@ -103,9 +112,8 @@ def test_what_is_not_signed_with_the_key_and_new_changes_nothing(forge, armed):
     bench = SignedBench()
     if armed:
         assert bench.arm() == ACCEPTED
-    for name, message in ORDERS.items():
-        if message is None:
-            message = arming(bench)
+    for name, order in ORDERS.items():
+        message = order or arming(bench)
         bench.messages.clear()
         before = state_of(bench)
         bench.receive(forge(bench, message))
@@ -119,7 +127,7 @@ def test_what_is_not_signed_with_the_key_and_new_changes_nothing(forge, armed):
 
 
 def arming(bench: BoardBench):
-    """The command that arms this board."""
+    """Return the command that arms this board."""
     halves = [
         float(half)
         for value in (_firmware.dialect_hash(), bench.board.parameter_hash)
@@ -140,7 +148,7 @@ def test_a_signed_session_drives():
 
 
 def test_every_frame_of_the_board_is_signed_and_counts_up():
-    """pymavlink finds each good; nothing goes out that is not signed."""
+    """Pymavlink finds each good; nothing goes out that is not signed."""
     bench = SignedBench()
     stamps = []
     for _ in range(300):
@@ -154,7 +162,7 @@ def test_every_frame_of_the_board_is_signed_and_counts_up():
             assert len(bench.peer.heard(data[:size])) == 1
             data = data[size:]
     assert len(stamps) > 60
-    assert all(a < b for a, b in zip(stamps, stamps[1:], strict=False))
+    assert all(a < b for a, b in itertools.pairwise(stamps))
 
 
 def test_a_frame_sent_again_is_refused():
@@ -246,7 +254,7 @@ def test_the_same_key_again_writes_nothing():
 
 @pytest.mark.parametrize("new", [OTHER_KEY, bytes(32)], ids=["another key", "no key"])
 def test_a_key_cut_short_in_storage_never_lets_unsigned_frames_in(new):
-    """Power gone after each byte: the old key or the new one is in force, and no key only where that was stored whole."""
+    """Power gone after each byte: the old key or the new one; none only where that was stored whole."""
     bench = SignedBench()
     bench.tick(STORING_TICKS)
     message = dialect.MAVLink_setup_signing_message(1, 1, list(new), STAMP)
@@ -286,7 +294,7 @@ def test_a_first_key_cut_short_locks_the_board():
 
 
 def stamps_refused(bench: SignedBench, frames: list[bytes]) -> bool:
-    """Whether none of the frames is acted on."""
+    """Return whether none of the frames is acted on."""
     state = bench.board.state
     for frame in frames:
         bench.receive(frame)

@@ -20,7 +20,7 @@ from hil.wire import dialect
 
 CLOCK_HZ = 16_000_000
 RATES_HZ = {"WHEEL_SETPOINT": 30, "WHEEL_STATE": 50}
-# Key, then header, CRC, link id and time stamp are hashed with the payload; a digest's padding takes nine bytes.
+# Key, header, CRC, link id and time stamp are hashed with the payload; the digest's padding takes nine bytes.
 _OVERHEAD_BYTES = 32 + 10 + 2 + 1 + 6
 _BLOCK_BYTES, _PADDING_BYTES = 64, 9
 _SOURCES = ("sha256.cpp", "sha256.h", "sha256_avr.S", "flash.h")
@@ -137,7 +137,9 @@ def main() -> None:
     for name, rate_hz in RATES_HZ.items():
         cycles = cost.signature(name)
         share = cycles * rate_hz / CLOCK_HZ
-        print(f"{name}: {cycles} cycles, {1e3 * cycles / CLOCK_HZ:.1f} ms, {share:.1%} at {rate_hz} Hz")
+        print(
+            f"{name}: {cycles} cycles, {1e3 * cycles / CLOCK_HZ:.1f} ms, {share:.1%} at {rate_hz} Hz"
+        )
 
 
 if __name__ == "__main__":

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
-
 from tests.pil.rigs import needs_toolchain
 from tests.pil.signing_cost import expected, measure, texts_drawn
 
@@ -11,7 +9,7 @@ pytestmark = needs_toolchain
 
 
 def test_the_processor_makes_the_digests_of_the_standard_in_so_many_cycles():
-    """Texts of two blocks, drawn: hashlib's digests; 21,600 cycles a block, half of what C takes, in slices."""
+    """Texts of two blocks, drawn: hashlib's digests; half the cycles that C takes, in slices."""
     texts = texts_drawn(40)
     cost = measure(texts)
     assert cost.digests == expected(texts)

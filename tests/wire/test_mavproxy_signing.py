@@ -27,9 +27,20 @@ UNSIGNED = [(6, "param set PWM_MAX 0.25"), (4, "link"), (2, "")]
 
 def mavproxy(folder: Path, lines: list[tuple[int, str]]) -> str:
     """Start MAVProxy on the port, type the lines, and return what it has shown."""
-    words = ["mavproxy.py", "--master=./port", "--baudrate", "57600", "--default-modules=signing,param,link"]
+    words = [
+        "mavproxy.py",
+        "--master=./port",
+        "--baudrate",
+        "57600",
+        "--default-modules=signing,param,link",
+    ]
     process = subprocess.Popen(
-        words, cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        words,
+        cwd=folder,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
     )
     assert process.stdin is not None
     for seconds, line in lines:

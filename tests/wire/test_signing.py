@@ -1,4 +1,4 @@
-"""The host's signing: against pymavlink both ways, its key files, what it says of a wrong key, what it records."""
+"""The host's signing: pymavlink as its peer, key files, what it says of a wrong key, what it records."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ TEXT = dialect.MAVLink_statustext_message(6, b"armed")
 
 
 def peer(key: Key, stamp: int = STAMP, link_id: int = 0, system: int = 1) -> dialect.MAVLink:
-    """pymavlink's own signing."""
+    """Return pymavlink's own signing."""
     mav = dialect.MAVLink(None, system, 1)
     mav.robust_parsing = True
     mav.signing.secret_key, mav.signing.timestamp = key.secret, stamp
@@ -41,7 +41,7 @@ def peer(key: Key, stamp: int = STAMP, link_id: int = 0, system: int = 1) -> dia
 
 
 def checker(key: Key = KEY, stamp: int = STAMP) -> FrameChecker:
-    """A checker whose own stamp is this."""
+    """Return a checker whose own stamp is this."""
     signer = FrameSigner(key)
     signer.stamp = stamp
     return FrameChecker(key, signer)
@@ -178,7 +178,7 @@ def test_a_key_never_shows_itself():
 
 
 def fault_of(host: Key | None, board: Key | None) -> str:
-    """What a host with a key says of a twin whose board has another, or none."""
+    """Return what a host with a key says of a twin whose board has another, or none."""
     rig = open_rig("twin", load_scenario("scenario-1"), "pose", 1, board)
     bare = rig._rig if isinstance(rig, SignedRig) else rig
     stream = bare.stream if host is None else SignedStream(bare.stream, host)
@@ -208,7 +208,7 @@ def test_a_host_without_a_key_is_named():
 
 @pytest.fixture(scope="module")
 def signed_run(tmp_path_factory):
-    """A run with a key, recorded."""
+    """Return a run with a key, recorded."""
     out = tmp_path_factory.mktemp("signed") / "run"
     scenario = load_scenario("scenario-1", ["duration_s=3.0"])
     spec = RunSpec(scenario, "twin", "pose", "asg-ism", "asg-ism", 1, out, key=KEY)

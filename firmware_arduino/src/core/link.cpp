@@ -44,7 +44,8 @@ uint8_t mark_signed(Link& link, uint8_t* frame, uint8_t n) {
 void begin_check(Link& link) {
   const mavlink_message_t& rx = link.rx;
   uint8_t* text = link.signer.text;
-  memcpy(text, reinterpret_cast<const uint8_t*>(&rx) + offsetof(mavlink_message_t, magic), MAVLINK_NUM_HEADER_BYTES);
+  memcpy(text, reinterpret_cast<const uint8_t*>(&rx) + offsetof(mavlink_message_t, magic),
+         MAVLINK_NUM_HEADER_BYTES);
   text += MAVLINK_NUM_HEADER_BYTES;
   memcpy(text, rx.payload64, rx.len);
   text += rx.len;

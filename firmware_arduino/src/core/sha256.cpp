@@ -56,7 +56,13 @@ void hil_sha256_extend(uint32_t* w, uint8_t n) {
 void sha256_init(Sha256& s) { HIL_FLASH_COPY(s.h, START, sizeof(s.h)); }
 
 void sha256_words(Sha256& s, uint8_t at, const uint8_t* bytes, uint8_t words) {
-  for (; words > 0; --words, ++at, bytes += 4) s.w[at] = sha256_word(bytes);
+  uint8_t* out = reinterpret_cast<uint8_t*>(s.w + at);  // board and host keep the lowest byte first
+  for (; words > 0; --words, bytes += 4) {
+    *out++ = bytes[3];
+    *out++ = bytes[2];
+    *out++ = bytes[1];
+    *out++ = bytes[0];
+  }
 }
 
 void sha256_begin(Sha256& s) {
@@ -72,6 +78,10 @@ bool sha256_slice(Sha256& s) {
   if (s.round < SHA_ROUNDS) return false;
   for (uint8_t i = 0; i < SHA_WORDS; ++i) s.h[i] += s.v[i];
   return true;
+}
+
+uint8_t sha256_byte(const Sha256& s, uint8_t index) {
+  return reinterpret_cast<const uint8_t*>(s.h)[index ^ 3u];
 }
 
 }  // namespace hil

@@ -3,7 +3,6 @@
 #define HIL_CORE_SHA256_H
 
 #include <stdint.h>
-#include <string.h>
 
 namespace hil {
 
@@ -19,21 +18,15 @@ struct Sha256 {
   uint8_t round;           // to come next
 };
 
-// Four bytes, highest first; board and host have the lowest first.
-inline uint32_t sha256_word(const uint8_t* bytes) {
-  const uint8_t turned[4] = {bytes[3], bytes[2], bytes[1], bytes[0]};
-  uint32_t word;
-  memcpy(&word, turned, 4);
-  return word;
-}
-
 void sha256_init(Sha256& s);
-// The words of `bytes` from w[at] on.
+// The words of `bytes` (four each, highest first) from w[at] on.
 void sha256_words(Sha256& s, uint8_t at, const uint8_t* bytes, uint8_t words);
 // Starts with the block whose sixteen words are given.
 void sha256_begin(Sha256& s);
 // The next eight rounds. True when they were the block's last, and h has it.
 bool sha256_slice(Sha256& s);
+// A byte of the digest.
+uint8_t sha256_byte(const Sha256& s, uint8_t index);
 
 }  // namespace hil
 

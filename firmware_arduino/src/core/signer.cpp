@@ -40,10 +40,9 @@ void use_key(Signer& s, const uint8_t* key) {
 }
 
 bool has_key(const Signer& s, const uint8_t* key) {
-  for (uint8_t i = 0; i < SHA_WORDS; ++i) {
-    if (sha256_word(key + 4 * i) != s.key[i]) return false;
-  }
-  return true;
+  uint8_t differs = 0;
+  for (uint8_t i = 0; i < KEY_SIZE; ++i) differs |= key[i] ^ reinterpret_cast<const uint8_t*>(s.key)[i ^ 3u];
+  return differs == 0;
 }
 
 uint16_t key_place(uint8_t slot) { return static_cast<uint16_t>(KEY_AT + slot * KEY_SLOT); }
@@ -70,7 +69,8 @@ void store_stamp(Signer& s) {
   const Stamp stamp = s.wanted > s.now ? s.wanted : s.now;
   memcpy(s.record, &stamp, STAMP_SIZE);
   put_crc(s, STAMP_SIZE);
-  begin_record(s, KeyWrite::STAMP, STAMP_RECORD, static_cast<uint16_t>(STAMPS_AT + s.stamp_slot * STAMP_RECORD));
+  begin_record(s, KeyWrite::STAMP, STAMP_RECORD,
+               static_cast<uint16_t>(STAMPS_AT + s.stamp_slot * STAMP_RECORD));
 }
 
 // The record is whole: what that means, and what is written next.
@@ -212,9 +212,7 @@ bool signer_slice(Signer& s, uint8_t (&signature)[SIGNATURE_SIZE]) {
     sha256_begin(s.sha);
     return false;
   }
-  for (uint8_t i = 0; i < SIGNATURE_SIZE; ++i) {
-    signature[i] = static_cast<uint8_t>(s.sha.h[i / 4] >> (24 - 8 * (i % 4)));
-  }
+  for (uint8_t i = 0; i < SIGNATURE_SIZE; ++i) signature[i] = sha256_byte(s.sha, i);
   s.job = HashJob::NONE;
   return true;
 }

@@ -37,7 +37,7 @@ constexpr uint8_t STAMP_RECORD = STAMP_SIZE + 4;
 constexpr uint16_t BOARD_STORAGE_SIZE = STAMPS_AT + STAMP_SLOTS * STAMP_RECORD;
 static_assert(BOARD_STORAGE_SIZE <= 4096, "the EEPROM of the Mega 2560");
 
-enum class Signing : uint8_t { OFF, ON, LOCKED };  // LOCKED: what is stored of a key is damaged
+enum class Signing : uint8_t { OFF, ON, LOCKED };         // LOCKED: what is stored of a key is damaged
 enum class HashJob : uint8_t { NONE, CHECK, SIGN, ACT };  // ACT: checked, and good
 enum class KeyWrite : uint8_t { NONE, KEY, WIPE, STAMP };
 
@@ -54,9 +54,9 @@ struct Signer {
   HashJob job;
   bool second;  // a second block follows
   uint8_t text[SIGNED_PAD];
-  bool waiting;         // the frame in link.rx waits for its check
-  uint32_t arrived_us;  // when it came
-  uint32_t heard;       // frames found good
+  bool waiting;             // the frame in link.rx waits for its check
+  uint32_t arrived_us;      // when it came
+  uint32_t heard;           // frames found good
   Stamp now, kept, wanted;  // own stamp; the last in storage; the one that is to be stored soon, 0 none
   Sender senders[SENDERS];
   KeyWrite writing;

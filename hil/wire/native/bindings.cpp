@@ -167,9 +167,8 @@ NB_MODULE(_wire, m) {
   nb::set_leak_warnings(false);              // values held by a test session at exit are no leak
   nb::module_::import_("hil.core._native");  // the type of Link.clock
   m.def(
-      "checksum",
-      [](const nb::bytes& data, std::uint8_t extra) { return wire::checksum(view(data), extra); }, "data"_a,
-      "extra"_a);
+      "checksum", [](const nb::bytes& data, std::uint8_t extra) { return wire::checksum(view(data), extra); },
+      "data"_a, "extra"_a);
   bind_wheel_state(m);
   bind_report(m);
   bind_link(m);

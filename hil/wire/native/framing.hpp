@@ -111,8 +111,8 @@ class FrameReader {
   };
 
   static bool has_crc(std::string_view frame, const mavlink_msg_entry_t& entry) {
-    const std::uint16_t sent = static_cast<std::uint16_t>(
-        static_cast<std::uint8_t>(frame[frame.size() - 2]) | static_cast<std::uint8_t>(frame.back()) << 8);
+    const std::uint16_t sent = static_cast<std::uint16_t>(static_cast<std::uint8_t>(frame[frame.size() - 2]) |
+                                                          static_cast<std::uint8_t>(frame.back()) << 8);
     return checksum(frame.substr(1, frame.size() - 3), entry.crc_extra) == sent;
   }
   void skip(std::size_t& start) {
