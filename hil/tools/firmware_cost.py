@@ -60,7 +60,7 @@ class FirmwareCost:
     frames: FrameCost
 
 
-class _Bench:
+class Bench:
     """A board brought up on a plain wire and driven by set-points."""
 
     def __init__(self, robot: RobotConfig, changes: Mapping[str, float], key: Key | None) -> None:
@@ -87,16 +87,17 @@ class _Bench:
         begin_s = self.rig.now_s()
         for step in range(round(seconds / _SETPOINT_S)):
             self.link.send_setpoint(self.rig.now_s(), *speeds(step * _SETPOINT_S))
-            self._listen(begin_s + (step + 1) * _SETPOINT_S)
+            self.listen(begin_s + (step + 1) * _SETPOINT_S)
         after = self.rig.board.usage()
         return 1.0 - (after["asleep"] - before["asleep"]) / (after["cycles"] - before["cycles"])
 
     def stop(self) -> None:
         """Disarm and wait until the robot stands."""
         handshake.finish(self.link, self.rig, handshake.disarm(self.link))
-        self._listen(self.rig.now_s() + 2.0)
+        self.listen(self.rig.now_s() + 2.0)
 
-    def _listen(self, until_s: float) -> None:
+    def listen(self, until_s: float) -> None:
+        """Take what the board says until then."""
         while self.rig.now_s() < until_s:
             self.rig.wait(until_s)
             for report in self.link.poll(self.rig.now_s()):
@@ -116,7 +117,7 @@ def measure(
     `parameters` are board parameters that differ from their defaults, `key` is a signing key set on it.
     """
     made, changes = build(), parameters or {}
-    bench, parts = _Bench(robot, changes, key), part_map(made)
+    bench, parts = Bench(robot, changes, key), part_map(made)
     board = bench.rig.board
     awake_ratio = bench.drive(3.0, _weaving)
     board.start_profile(parts.part_of_word)
@@ -148,11 +149,11 @@ def measure(
 
 def _full_encoders(
     robot: RobotConfig, changes: Mapping[str, float], key: Key | None
-) -> tuple[_Bench, float]:
+) -> tuple[Bench, float]:
     """Run with finer encoders, 8,000 edges a second at 10 rad/s; return bench and share awake."""
     counts_per_turn = round(FULL_EDGES_1_S * math.tau / _FULL_SPEED_RAD_S)
     fine = robot.model_copy(update={"encoder_counts_per_turn": counts_per_turn})
-    bench = _Bench(fine, changes, key)
+    bench = Bench(fine, changes, key)
     straight = (_FULL_SPEED_RAD_S, _FULL_SPEED_RAD_S)
     bench.drive(1.0, lambda _: straight)
     awake_ratio = bench.drive(2.0, lambda _: straight)

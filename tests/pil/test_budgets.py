@@ -4,7 +4,8 @@ import pytest
 
 from hil.board.build import FLASH_LIMIT_BYTES, RAM_LIMIT_BYTES
 from hil.board.stack_bound import RAM_BYTES
-from hil.tools.firmware_cost import CLOCK_HZ, TICKS_PER_S, measure
+from hil.tools.firmware_cost import CLOCK_HZ, TICKS_PER_S, Bench, measure
+from hil.wire import dialect
 from hil.wire.signing import Key
 from tests.pil.rigs import needs_toolchain
 from tests.twin.rigs import robot
@@ -89,6 +90,20 @@ def test_the_implicit_wheel_law_costs_less_than_the_default_one(cost):
     assert 0.1 < implicit.tick_and_link_ratio <= MARGIN * 0.40
 
 
+@pytest.fixture
+def signed_bench():
+    """Return a board with a key, armed, and its host."""
+    return Bench(robot(), {}, Key(bytes(range(1, 33)), "key"))
+
+
+def _status(bench):
+    """Return the board's next account of what it lost, while set-points keep it armed."""
+    bench.link.forget_sys_status()
+    while bench.link.sys_status is None:
+        bench.drive(0.1, lambda _: (3.0, 3.0))
+    return bench.link.sys_status
+
+
 @pytest.fixture(scope="module")
 def signed():
     """Return the cost with a signing key: every frame of both sides signed."""
@@ -108,6 +123,21 @@ def test_signing_makes_no_tick_late(signed):
     assert signed.frames.overruns == 0
     assert 0 < signed.frames.latest_us <= MARGIN * 1000
     assert signed.frames.latest_us + signed.longest_tick_us <= 0.75 * 4000
+
+
+def test_a_signed_session_loses_no_frame(signed_bench):
+    """Set-points at 100 Hz beside reports at 50, all signed: none lost, refused or dropped, no tick late."""
+    link, rig = signed_bench.link, signed_bench.rig
+    _status(signed_bench)
+    begin_s = rig.now_s()
+    for count in range(200):
+        link.send_setpoint(rig.now_s(), 3.0, 3.0)
+        signed_bench.listen(begin_s + (count + 1) / 100)
+    after = _status(signed_bench)
+    lost = (after.errors_comm, after.errors_count1, after.errors_count2, after.errors_count3)
+    assert lost == (0, 0, 0, 0)
+    assert after.errors_count4 == 0
+    assert signed_bench.last.state == dialect.HIL_STATE_ARMED
 
 
 def test_signing_loses_no_edge_and_keeps_the_stack(signed):
