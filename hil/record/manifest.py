@@ -143,6 +143,9 @@ class Manifest(BaseModel):
     dialect_hash: str = ""
     parameter_hash: str = ""
     firmware_build_id: str = ""
+    signed: bool = Field(
+        False, description="frames were checked with a signing key before they were recorded"
+    )
     open_loop_of: str = Field(
         "", description="the record that answered in place of a robot: the path is not this law's"
     )

@@ -218,6 +218,7 @@ def signed_run(tmp_path_factory):
 def test_a_signed_run_is_whole_and_its_record_holds_no_key(signed_run):
     """Neither raw nor in hexadecimal digits nor in base64, in no file of it, and no signature."""
     assert signed_run.manifest.outcome == "complete"
+    assert signed_run.manifest.signed
     shapes = [
         KEY.secret, KEY.secret[:16], KEY.secret.hex().encode(), KEY.secret.hex().upper().encode(),
         base64.b64encode(KEY.secret), base64.b64encode(KEY.secret)[:20],
