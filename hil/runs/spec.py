@@ -75,4 +75,7 @@ def judged_status(records: Iterable[RunRecord]) -> int:
     As a run's own, the gravest of all; but a record that was stopped by Ctrl-C or cut off has failed
     its requirements (1): this command was not stopped.
     """
-    return max(3 if r.manifest.outcome == "fault" else min(exit_status(r), 1) for r in records)
+    return max(
+        3 if r.manifest.outcome == "fault" and not r.manifest.is_cut_off else min(exit_status(r), 1)
+        for r in records
+    )
