@@ -79,7 +79,7 @@ def execute(
     cv2.setNumThreads(1)  # search windows are small: handing them to threads costs more
     parameters, used, manifest = checked(spec)
     law, live = law_and_gains(spec.outer, spec.scenario, live=orders is not None)
-    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
+    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed, spec.key)
     ctrl_c = CtrlC()
     try:
         with ctrl_c:
@@ -150,7 +150,7 @@ def execute_in_memory(
     """
     parameters, used, manifest = checked(spec)
     law = law or make_law(spec.outer, spec.scenario)
-    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
+    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed, spec.key)
     try:
         recorder = MemoryRecorder(manifest)
         parts = make_parts(spec, rig, recorder, law)
