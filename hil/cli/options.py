@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,6 +52,10 @@ figure_option = click.option(
     help="Figure of merit beside the built-in ones: FILE.py, FILE.py:NAME, or a name that `hil list "
     "figures` shows; may be repeated.",
 )  # fmt: skip
+key_option = click.option(
+    "--key", "key_file", type=click.Path(path_type=Path), metavar="FILE",
+    help="Signing key of the board; a simulated one is given it.  [default for ports: HIL_KEY]",
+)  # fmt: skip
 out_option = click.option(
     "--out", type=click.Path(path_type=Path), metavar="DIR",
     help="Folder for the record(s); must not exist or be empty. [default: a new one in runs/]",
@@ -74,6 +79,12 @@ def plain_console() -> Console:
     from rich.console import Console
 
     return Console(highlight=False, soft_wrap=True, markup=False)
+
+
+def tell(text: str) -> None:
+    """Write a line to stdout; its styles are kept on a terminal, and as NO_COLOR or FORCE_COLOR say."""
+    colours = False if os.environ.get("NO_COLOR") else bool(os.environ.get("FORCE_COLOR")) or None
+    click.echo(text, color=colours)
 
 
 def print_json(document: dict[str, Any]) -> None:

@@ -16,6 +16,9 @@ from hil.config.link import UART_BAUD
 from hil.core.errors import BadInput, RigFault
 from hil.core.rig import PORT_BYTES, ByteStream, Frame, LineBacklog, Truth
 from hil.rigs.frames import FrameSource
+from hil.rigs.key_file import key_of_environment
+from hil.rigs.signed import SignedStream
+from hil.wire.signing import Key
 
 try:
     from termios import error as termios_error
@@ -78,6 +81,11 @@ class SerialStream:
         with contextlib.suppress(serial.SerialException, OSError, termios_error):
             self.port.reset_output_buffer()
 
+    def discard_received(self) -> None:
+        """Forget what has arrived and was not read."""
+        with contextlib.suppress(serial.SerialException, OSError, termios_error):
+            self.port.reset_input_buffer()
+
     def close(self) -> None:
         """Release the port; safe to call twice."""
         self.port.close()
@@ -111,12 +119,30 @@ def _reason(error: Exception) -> str:
 
 
 class SerialRig:
-    """A robot on a serial port and its camera, in real time; nobody knows its true pose."""
+    """A robot on a serial port and its camera, in real time; nobody knows its true pose.
 
-    def __init__(self, device: str, baud: int, camera: FrameSource | None) -> None:
+    `key` is the board's; without one it is that of the environment. Where there is none, or not `signed`,
+    bytes pass as they are.
+    """
+
+    def __init__(
+        self,
+        device: str,
+        baud: int,
+        camera: FrameSource | None,
+        key: Key | None = None,
+        *,
+        signed: bool = True,
+    ) -> None:
+        key = (key or key_of_environment()) if signed else None
         self._port = SerialStream(device, baud)
-        self.stream: ByteStream = self._port
+        self.stream: ByteStream = SignedStream(self._port, key) if key else self._port
         self._camera = camera
+
+    def watch_by(self, camera: FrameSource) -> None:
+        """Take the camera; what the board said while it was opened is dropped, for it is not of now."""
+        self._camera = camera
+        self._port.discard_received()
 
     def now_s(self) -> float:
         """Return the monotonic clock of this machine."""

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.config.robot import BUILT_IN_PLANT
-from hil.control.task_notes import notes
+from hil.control.references import notes
+from hil.core.errors import BadInput
 from hil.core.figures import metric_of
 from hil.core.registries import ESTIMATORS, FIGURES, LOCALISERS, OUTER_LAWS, REFERENCES, VEHICLES
 from hil.core.registry import BUILT_IN, Entry, SourceText
@@ -21,7 +22,8 @@ from hil.record.manifest import (
     collect_versions,
     git_revision,
 )
-from hil.record.schema import own_columns
+from hil.record.schema import SAMPLE_NAMES, TRACE_KEYS
+from hil.rigs.key_file import key_of_environment
 from hil.rigs.opening import REPLAY
 
 if TYPE_CHECKING:
@@ -69,6 +71,7 @@ def make_manifest(spec: RunSpec, parameters: Mapping[str, float], used: Used) ->
         plugins=_from_outside(spec, used),
         trace=trace_terms(law),
         figures=[FigureTerm.of(metric_of(name)) for name in spec.scenario.own_figures],
+        signed=_is_signed(spec),
         open_loop_of=spec.target.removeprefix(REPLAY) if spec.target.startswith(REPLAY) else "",
         notes=notes(spec.scenario),
         versions=collect_versions(),
@@ -78,11 +81,24 @@ def make_manifest(spec: RunSpec, parameters: Mapping[str, float], used: Used) ->
     )
 
 
+def _is_signed(spec: RunSpec) -> bool:
+    """Say whether the run's link is signed: by its own key, or on a port by that of the environment."""
+    on_a_port = spec.target.startswith("serial:")
+    return spec.key is not None or (on_a_port and key_of_environment() is not None)
+
+
 def trace_terms(law: Entry) -> list[TraceTerm]:
-    """Return the columns that a law brings along, for a manifest; raises BadInput."""
+    """Return the columns that a law adds with `trace=`, for a manifest; raises BadInput for a name taken."""
+    taken = {*SAMPLE_NAMES, *TRACE_KEYS}
+    for name in law.trace:
+        if name in taken:
+            raise BadInput(
+                f"law {law.name} ({law.origin}): trace name {name!r} is that of a column that every "
+                "record has; name it otherwise"
+            )
     return [
-        TraceTerm(name=column.name, unit=column.unit, meaning=column.meaning)
-        for column in own_columns(law)
+        TraceTerm(name=name, unit=unit, meaning=meaning)
+        for name, (unit, meaning) in law.trace.items()
     ]
 
 

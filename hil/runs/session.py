@@ -18,7 +18,7 @@ from hil.record.schema import TRACE_KEYS
 from hil.runs import _native
 from hil.runs.intake import Intake
 from hil.runs.parts import Ending, Parts, Progress, Publish, Situation
-from hil.runs.watching import DIAGNOSIS, make_watch
+from hil.runs.watching import DIAGNOSIS, make_pump, make_watch
 from hil.wire import handshake
 
 if TYPE_CHECKING:
@@ -64,8 +64,8 @@ class Session:
 
         self._note = note  # no method: native parts keep it, and know nothing of this session
         self._watch = make_watch(scenario, parts, note)
-        self._intake = Intake(scenario.camera, parts, self._watch, note)
-        self._pump = self._intake.pump
+        self._pump = make_pump(parts, self._watch, note)
+        self._intake = Intake(scenario.camera, parts, self._watch, note, self._pump)
         self._format = _native.RowFormat(TRACE_KEYS, parts.own_terms)
         self.error: Exception | SystemExit | None = None  # what ended the run and is no rig fault
 

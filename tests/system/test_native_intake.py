@@ -18,14 +18,14 @@ from hypothesis import strategies as st
 from hil.board.wheel_laws import WHEEL_LAWS
 from hil.config.fit import board_parameters
 from hil.config.load import load_scenario
+from hil.control.laws.making import make_law
 from hil.core import _native as core_native
 from hil.core.clocks import CameraClock
 from hil.record.memory import MemoryRecorder
 from hil.rigs.opening import open_rig
-from hil.runs import intake
+from hil.runs import session
 from hil.runs.assembly import make_parts
 from hil.runs.execute import execute_in_memory
-from hil.runs.law_guard import make_law
 from hil.runs.provenance import make_manifest, used_things
 from hil.runs.session import Session
 from hil.runs.spec import RunSpec
@@ -90,7 +90,7 @@ def spec_of(case):
 def run(case, make_pump):
     """Return the record of a case with the intake that `make_pump` gives."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(intake, "make_pump", make_pump)
+        patch.setattr(session, "make_pump", make_pump)
         return execute_in_memory(spec_of(case))
 
 
@@ -112,7 +112,7 @@ def in_python(case):
     return run(case, lambda *_: None)
 
 
-REAL = intake.make_pump
+REAL = session.make_pump
 
 
 def differences(one, other):
@@ -172,7 +172,7 @@ def test_what_native_code_cannot_do_is_left_to_python(what, more):
     spec = replace(spec_of(ONE), scenario=load_scenario("scenario-1", ["duration_s=1.5", *more]))
     made = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(intake, "make_pump", lambda *parts: made.append(REAL(*parts)) or made[-1])
+        patch.setattr(session, "make_pump", lambda *parts: made.append(REAL(*parts)) or made[-1])
         record = execute_in_memory(spec)
     assert made == [None], what
     assert record.manifest.tick_count > 30
