@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "symmetric.hpp"
+#include "rim_solve.hpp"
 
 namespace vision {
 namespace {
@@ -21,15 +21,9 @@ constexpr double kCentroidLevel = 0.4;  // of the way from the surroundings to t
 // A step this short ends the fit; after one longer than that all rays count again.
 constexpr double kSettledPx = 0.03;
 constexpr double kRekeepPx = 0.5;
-constexpr double kOutlierSigmas = 3.0;
 // Rays are as close together as they are so far inside, in radii; the least length of one, relative.
 constexpr double kInside = 0.25;
 constexpr double kLengthMin = 0.1;
-// Of five rays side by side, more of which must have an edge for that in the middle.
-constexpr int kBesideMin = 3;
-// So few kept rays side by side lie between two parts of a cover, whose levels they share.
-constexpr int kRunMin = 4;
-constexpr double kEdgeSigmaMinPx = 0.05;
 constexpr double kOffMax = 0.4;  // of the radius: a square's corners
 // Doubt of the radius before the fit, relative, as a pull towards the known one.
 constexpr double kRadiusSigma = 0.02;
@@ -38,124 +32,6 @@ constexpr double kRadiusPull = (0.15 / kRadiusSigma) * (0.15 / kRadiusSigma);
 constexpr double kAlikeSigma = 0.0027;
 constexpr double kAlikeMax = 0.03;  // off it a disc is of another size
 constexpr double kAlikePull = (0.15 / kAlikeSigma) * (0.15 / kAlikeSigma);
-
-int count(const Mask& keep) { return static_cast<int>(std::count(keep.begin(), keep.end(), true)); }
-
-Matrix normal(const std::array<Move, kRays>& rows, const Mask& keep, double pull) {
-  Matrix n = {};
-  for (int ray = 0; ray < kRays; ++ray) {
-    for (int i = 0; keep[ray] && i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) {
-        n[i][j] += rows[ray][i] * rows[ray][j];
-      }
-    }
-  }
-  n[2][2] += pull;
-  return n;
-}
-
-// Usable rays whose levels hold nothing of a cover's: levels are means over neighbouring rays, and two
-// rays side by side that show no edge are something in front; one alone is noise.
-Mask clear_of_cover(const Mask& usable) {
-  Mask clear;
-  for (int ray = 0; ray < kRays; ++ray) {
-    const auto shown = [&](int away) { return usable[(ray + away + kRays) % kRays]; };
-    int beside = 0;
-    for (int k = -2; k <= 2; ++k) {
-      beside += shown(k) ? 1 : 0;
-    }
-    clear[ray] = usable[ray] && beside > kBesideMin;
-    for (int k = -kLevelRays / 2 - 1; k <= kLevelRays / 2; ++k) {
-      clear[ray] = clear[ray] && (shown(k) || shown(k + 1));
-    }
-  }
-  return clear;
-}
-
-// Kept rays without short runs of them; where many are in such runs it is no cover that cut them off.
-Mask without_short_runs(const Mask& keep) {
-  Mask long_runs = keep;
-  for (int first = 0; first < kRays; ++first) {
-    int length = 0;
-    while (length < kRunMin && keep[(first + length) % kRays]) {
-      ++length;
-    }
-    const bool starts = !keep[(first + kRays - 1) % kRays];
-    for (int i = 0; starts && length < kRunMin && i < length; ++i) {
-      long_runs[(first + i) % kRays] = false;
-    }
-  }
-  return 4 * count(long_runs) < 3 * count(keep) ? keep : long_runs;
-}
-
-// (du, dv, growth) by least squares; none when too little of the rim is left.
-std::optional<Move> solved(const std::array<Move, kRays>& rows, const Round& shift, const Mask& keep,
-                           const RadiusPull& radius) {
-  if (count(keep) < kRays / 6) {
-    return std::nullopt;
-  }
-  const std::optional<Matrix> covariance = inverse(normal(rows, keep, radius.pull));
-  if (!covariance) {
-    return std::nullopt;
-  }
-  Move right = {0.0, 0.0, radius.pull * radius.growth};
-  for (int ray = 0; ray < kRays; ++ray) {
-    for (int i = 0; keep[ray] && i < 3; ++i) {
-      right[i] += rows[ray][i] * shift[ray];
-    }
-  }
-  return Move{dot3((*covariance)[0], right), dot3((*covariance)[1], right), dot3((*covariance)[2], right)};
-}
-
-// A robust standard deviation of kept residuals: 1.48 of their median.
-double spread(const Round& rest, const Mask& keep) {
-  std::array<double, kRays> kept;
-  int n = 0;
-  for (int ray = 0; ray < kRays; ++ray) {
-    if (keep[ray]) {
-      kept[n++] = rest[ray];
-    }
-  }
-  std::nth_element(kept.begin(), kept.begin() + n / 2, kept.begin() + n);
-  return std::max(1.4826 * kept[n / 2], kEdgeSigmaMinPx);
-}
-
-// (du, dv, growth) without the rays far off the fit, which leave `keep`; `tries` times to find them.
-std::optional<Move> robust(const std::array<Move, kRays>& rows, const Round& shift, const Mask& usable,
-                           const RadiusPull& radius, int tries, Mask& keep) {
-  for (int i = 0; i < tries; ++i) {
-    const std::optional<Move> move = solved(rows, shift, without_short_runs(keep), radius);
-    if (!move) {
-      return std::nullopt;
-    }
-    Round rest;
-    for (int ray = 0; ray < kRays; ++ray) {
-      rest[ray] = std::abs(shift[ray] - dot3(rows[ray], *move));
-    }
-    const double limit = kOutlierSigmas * spread(rest, keep);
-    Mask within;
-    for (int ray = 0; ray < kRays; ++ray) {
-      within[ray] = usable[ray] && rest[ray] < limit;
-    }
-    if (within == keep) {
-      return move;
-    }
-    keep = within;
-  }
-  return solved(rows, shift, without_short_runs(keep), radius);
-}
-
-// Where a change of every ray's edge, in samples, moves the centre.
-Vec2 moved(const Matrix& covariance, const std::array<Move, kRays>& rows, const Round& scale,
-           const Mask& keep, const Round& change) {
-  Move right = {};
-  for (int ray = 0; ray < kRays; ++ray) {
-    for (int i = 0; keep[ray] && i < 3; ++i) {
-      right[i] += rows[ray][i] * scale[ray] * change[ray];
-    }
-  }
-  return {dot3(covariance[0], right), dot3(covariance[1], right)};
-}
 
 }  // namespace
 

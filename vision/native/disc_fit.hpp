@@ -8,6 +8,7 @@
 #include "camera.hpp"
 #include "claim.hpp"
 #include "picture.hpp"
+#include "rim_solve.hpp"
 #include "rims.hpp"
 #include "symmetric.hpp"
 
@@ -21,11 +22,6 @@ struct Disc {
   double u_px, v_px, radius_px, growth, share, residual_px;
   std::array<double, 3> covariance_px2;  // uu, uv, vv
   double contrast_dn, ground_ratio, square;
-};
-
-// What is known of a disc's growth before it is fitted, and the weight of that.
-struct RadiusPull {
-  double growth, pull;
 };
 
 class RimFitter {
