@@ -16,18 +16,18 @@ class ControlsConfig(Section):
     """
 
     exposure: float | None = quantity(
-        "", f"{_DRIVER}; V4L2's is 100 us, other drivers' the logarithm of seconds", None,
+        "(driver)", f"{_DRIVER}; V4L2's is 100 us, other drivers' the logarithm of seconds", None,
         ge=-20.0, le=100_000.0, source="the camera",
     )  # fmt: skip
     gain: float | None = quantity(
-        "", _DRIVER, None, ge=-1000.0, le=100_000.0, source="the camera"
+        "(driver)", _DRIVER, None, ge=-1000.0, le=100_000.0, source="the camera"
     )  # fmt: skip
     white_balance_k: float | None = quantity(
         "K", "colour temperature; left out: locked at what its automatics chose", None,
         ge=0.0, le=100_000.0, source="the camera",
     )  # fmt: skip
     focus: float | None = quantity(
-        "", _DRIVER, None, ge=0.0, le=100_000.0, source="the camera"
+        "(driver)", _DRIVER, None, ge=0.0, le=100_000.0, source="the camera"
     )  # fmt: skip
     raw: bool = Field(
         False,
