@@ -46,7 +46,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw) -> Par
             scenario.camera, drawn=spec.camera == "pose" and spec.is_simulated
         ),
         estimator=make_estimator(control.estimator, control, vehicle.geometry),
-        law=_limited(law, vehicle, scenario),
+        law=limited(law, vehicle, scenario),
         reference=make_reference(scenario.reference),
         vehicle=vehicle,
         recorder=recorder,
@@ -69,7 +69,7 @@ def make_ordered_parts(
     return replace(parts, orders=orders, reference=goal)
 
 
-def _limited(law: OuterLaw, vehicle: Vehicle, scenario: Scenario) -> OuterLaw:
+def limited(law: OuterLaw, vehicle: Vehicle, scenario: Scenario) -> OuterLaw:
     """Return the law in its axes, under what holds for every law."""
     limits = scenario.control.limits
     law = in_axes(law, scenario.control.axes_rad)

@@ -1,7 +1,7 @@
-"""The two ways in which a run takes in what arrives give the same run to the bit.
+"""The three ways in which a run in memory may advance give the same run to the bit.
 
-From arrival to arrival in native code; or step by step in Python, which every other rig, estimator and
-record needs.
+All its ticks in native code; from arrival to arrival in native code and tick by tick in Python, which a law
+or a reference of somebody's own needs; or step by step in Python, as other rigs, estimators and records do.
 """
 
 import gc
@@ -20,12 +20,13 @@ from hil.config.fit import board_parameters
 from hil.config.load import load_scenario
 from hil.core import _native as core_native
 from hil.core.clocks import CameraClock
+from hil.core.registries import OUTER_LAWS
 from hil.record.memory import MemoryRecorder
 from hil.rigs.opening import open_rig
-from hil.runs import intake
-from hil.runs.assembly import make_parts
+from hil.runs import intake, session
+from hil.runs.assembly import limited, make_parts
 from hil.runs.execute import execute_in_memory
-from hil.runs.law_guard import make_law
+from hil.runs.law_guard import at_rest, bare_law, make_law
 from hil.runs.provenance import make_manifest, used_things
 from hil.runs.session import Session
 from hil.runs.spec import RunSpec
@@ -49,8 +50,10 @@ FAULTS = {
 }
 CASES = st.fixed_dictionaries(
     {
-        "scenario": st.sampled_from(["scenario-1", "scenario-2", "scenario-3", "circle"]),
-        "outer": st.sampled_from(["asg-ism", "pid", "backstepping", "super-twisting"]),
+        "scenario": st.sampled_from(
+            ["scenario-1", "scenario-2", "scenario-3", "circle", "figure-eight", "stop-and-go"]
+        ),
+        "outer": st.sampled_from(["asg-ism", "pid", "asg-ism", "pid", "super-twisting"]),
         "inner": st.sampled_from(sorted(WHEEL_LAWS)),
         "fault": st.sampled_from(sorted(FAULTS)),
         "loss": st.sampled_from([0.0, 0.05]),
@@ -87,32 +90,55 @@ def spec_of(case):
     return RunSpec(scenario, "twin", "pose", case["outer"], case["inner"], case["seed"], Path())
 
 
-def run(case, make_pump):
-    """Return the record of a case with the intake that `make_pump` gives."""
+def parts_of(spec):
+    """Return the parts of a session over the twin, recorded in memory."""
+    rig = open_rig("twin", spec.scenario, "pose", spec.seed)
+    parameters = board_parameters(spec.scenario, spec.inner)
+    sink = MemoryRecorder(make_manifest(spec, parameters, used_things(spec)))
+    return make_parts(spec, rig, sink, make_law(spec.outer, spec.scenario))
+
+
+def run(case, make_pump, make_drive):
+    """Return the record of a case with the intake and the ticks that these give."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(intake, "make_pump", make_pump)
+        patch.setattr(session, "make_drive", make_drive)
         return execute_in_memory(spec_of(case))
 
 
-def in_native(case):
-    """Return the record of a case taken in by native code, which it must be."""
-    made = []
+def noted(make, made):
+    """Return a maker that notes what it gives."""
 
-    def make_pump(*parts):
-        made.append(REAL(*parts))
+    def noting(*parts):
+        made.append(make(*parts))
         return made[-1]
 
-    record = run(case, make_pump)
-    assert made[0] is not None
+    return noting
+
+
+def in_native(case):
+    """Return the record of a case that advances in native code, as it must."""
+    pumps, drives = [], []
+    record = run(case, noted(REAL, pumps), noted(REAL_DRIVE, drives))
+    assert pumps[0] is not None
+    controlled = any(event.kind == "armed" for event in record.events)
+    if controlled and case["outer"] in TRANSLATED:
+        assert drives[0] is not None
     return record
+
+
+def by_ticks(case):
+    """Return the record of a case taken in by native code, whose ticks are Python's."""
+    return run(case, REAL, lambda *_: None)
 
 
 def in_python(case):
     """Return the record of a case taken in by Python."""
-    return run(case, lambda *_: None)
+    return run(case, lambda *_: None, REAL_DRIVE)
 
 
-REAL = intake.make_pump
+REAL, REAL_DRIVE = intake.make_pump, session.make_drive
+TRANSLATED = ("asg-ism", "pid")  # laws that have a native form
 
 
 def differences(one, other):
@@ -137,16 +163,20 @@ def differences(one, other):
 
 @settings(max_examples=25, deadline=None)
 @given(CASES)
-def test_both_ways_give_the_same_run(case):
+def test_all_ways_give_the_same_run(case):
     """Samples, frames, events, counters, outcome and figures are equal to the bit, whatever is drawn."""
-    assert differences(in_native(case), in_python(case)) == []
+    native = in_native(case)
+    assert differences(native, in_python(case)) == []
+    assert differences(native, by_ticks(case)) == []
 
 
 @pytest.mark.parametrize("fault", sorted(FAULTS))
-def test_both_ways_give_the_same_run_under_each_fault(fault):
+def test_all_ways_give_the_same_run_under_each_fault(fault):
     """The same for each fault by itself; one that ends the run ends it with the same words."""
     case = ONE | {"fault": fault}
-    assert differences(in_native(case), in_python(case)) == []
+    native = in_native(case)
+    assert differences(native, in_python(case)) == []
+    assert differences(native, by_ticks(case)) == []
 
 
 def test_the_comparison_sees_a_changed_constant():
@@ -156,8 +186,60 @@ def test_the_comparison_sees_a_changed_constant():
         latency_s = spec_of(ONE).scenario.camera.latency_s + 1e-6
         return REAL(replace(parts, camera_clock=CameraClock(latency_s)), watch, note)
 
-    changed = differences(run(ONE, make_pump), in_python(ONE))
+    changed = differences(run(ONE, make_pump, REAL_DRIVE), in_python(ONE))
     assert {"samples.est_x_m", "frames.t_exposure_s", "figures"} <= set(changed)
+
+
+def test_the_comparison_sees_a_changed_law():
+    """With a gain off by its last bit in the native ticks alone the runs differ (negative control)."""
+
+    def make_drive(parts, *rest):
+        scenario = spec_of(ONE).scenario
+        gains = scenario.control.active_gains.asg_ism
+        other = gains.model_copy(update={"k1_s": math.nextafter(gains.k1_s, math.inf)})
+        entry = OUTER_LAWS.get("asg-ism")
+        law = at_rest(entry, bare_law(entry, other, scenario), scenario.control.limits)
+        changed = replace(parts, law=limited(law, parts.vehicle, scenario))
+        return REAL_DRIVE(changed, *rest)
+
+    changed = differences(run(ONE, REAL, make_drive), in_python(ONE))
+    # Set-points go out in 32 bits: the robot itself need not notice.
+    assert {"samples.eta1_cmd_m_s", "samples.v1_m_s3"} <= set(changed)
+
+
+@pytest.mark.parametrize(
+    ("what", "outer", "more"),
+    [
+        ("a law that has none", "super-twisting", []),
+        ("axes of its own", "asg-ism", ["control.axes_rad=0.3"]),
+    ],
+)
+def test_a_law_without_a_native_form_is_run_in_python(what, outer, more):
+    """Its ticks are Python's; arrivals are taken in by native code still."""
+    spec = replace(
+        spec_of(ONE), outer=outer, scenario=load_scenario("scenario-1", ["duration_s=1.5", *more])
+    )
+    drives = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(session, "make_drive", noted(REAL_DRIVE, drives))
+        record = execute_in_memory(spec)
+    assert drives == [None], what
+    assert record.manifest.tick_count > 30
+
+
+def test_who_steps_a_session_sees_each_tick_of_the_same_run():
+    """A caller that steps gets every situation; the run is that which nobody looks at."""
+    spec = spec_of(ONE)
+    parts = parts_of(spec)
+    stepped = Session(
+        spec.scenario, parts, board_parameters(spec.scenario, spec.inner), board_hashes
+    )
+    situations = list(stepped.steps())
+    record = parts.recorder.close(stepped.ending.outcome, stepped.ending.detail)
+    whole = in_native(ONE)
+    assert len(situations) == whole.manifest.tick_count == 61
+    for name, values in whole.samples.items():
+        assert np.asarray(values).tobytes() == np.asarray(record.samples[name]).tobytes(), name
 
 
 @pytest.mark.parametrize(
@@ -181,14 +263,11 @@ def test_what_native_code_cannot_do_is_left_to_python(what, more):
 def test_a_session_with_native_parts_is_forgotten_after_its_run():
     """Native parts keep no way back to their session: a campaign would keep every run."""
     spec = spec_of(ONE)
-    rig = open_rig("twin", spec.scenario, "pose", spec.seed)
-    parameters = board_parameters(spec.scenario, spec.inner)
-    sink = MemoryRecorder(make_manifest(spec, parameters, used_things(spec)))
-    parts = make_parts(spec, rig, sink, make_law(spec.outer, spec.scenario))
-    session = Session(spec.scenario, parts, parameters, board_hashes)
-    assert session.run().outcome == "complete"
-    kept = [weakref.ref(session), weakref.ref(rig)]
-    del session, parts, rig
+    parts = parts_of(spec)
+    ran = Session(spec.scenario, parts, board_parameters(spec.scenario, spec.inner), board_hashes)
+    assert ran.run().outcome == "complete"
+    kept = [weakref.ref(ran), weakref.ref(parts.rig)]
+    del ran, parts
     gc.collect()
     assert [ref() for ref in kept] == [None, None]
 
