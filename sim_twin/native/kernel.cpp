@@ -84,8 +84,31 @@ void Kernel::remember() {
 }
 
 std::int64_t Kernel::advance(std::int64_t t_us) {
-  while (time_us_ < t_us && board_->sent.empty()) step();
+  while (time_us_ < t_us && board_->sent.empty()) {
+    coast(t_us);
+    if (time_us_ < t_us) step();
+  }
   return time_us_;
+}
+
+// Takes at once the steps of a robot that stands while its board has nothing to do: of all that a step
+// does only the clock, the charge and the remembered poses would change.
+void Kernel::coast(std::int64_t t_us) {
+  if (outside_ || !faults_.empty() || (!disturbances_.empty() && time_us_ >= begin_us_)) return;
+  std::int64_t until_us = std::min(t_us, board_->quiet_until_us());
+  if (!disturbances_.empty()) until_us = std::min(until_us, begin_us_);
+  if (until_us <= time_us_ + options_.step_us) return;
+  set_drive();
+  const StateVector& x = plant_.state();
+  if (!plant_.rests(1e-6 * static_cast<double>(options_.step_us), drive_)) return;
+  if (!encoders_[0].stands_at(x[kWheelL]) || !encoders_[1].stands_at(x[kWheelR])) return;
+  while (time_us_ + options_.step_us < until_us) {
+    plant_.rest_on();
+    time_us_ += options_.step_us;
+    if (time_us_ % kPoseSpacing_us == 0) remember();
+  }
+  sag_v_ = 0.0;
+  battery_v_ = plant_.battery_v(drive_, sag_v_);
 }
 
 std::vector<Chunk> Kernel::take_sent() {

@@ -301,10 +301,14 @@ bool Plant::is_rest(const StateVector& before, const Drive& drive) const {
   return std::memcmp(before.data(), x_.data(), kCharge * sizeof(double)) == 0;
 }
 
+bool Plant::rests(double h_s, const Drive& drive) const {
+  return rest_.holds && rest_.h_s == h_s && std::memcmp(&rest_.drive, &drive, sizeof drive) == 0;
+}
+
 void Plant::step(double h_s, const Drive& drive) {
   constexpr LoadVector kNone{};
-  if (rest_.holds && rest_.h_s == h_s && std::memcmp(&rest_.drive, &drive, sizeof drive) == 0) {
-    x_[kCharge] += rest_.charge_change;
+  if (rests(h_s, drive)) {
+    rest_on();
     return;
   }
   const StateVector before = x_;

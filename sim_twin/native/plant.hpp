@@ -122,6 +122,10 @@ class Plant {
   // with the same result to the bit.
   void step(double h_s, const Drive& drive);
 
+  // Whether a step without loads would change nothing but the charge, by what rest_on adds to it.
+  bool rests(double h_s, const Drive& drive) const;
+  void rest_on() { x_[kCharge] += rest_.charge_change; }
+
   const StateVector& state() const { return x_; }
   StateVector& changed_state() {  // to be written to
     rest_.holds = false;

@@ -24,9 +24,9 @@ void bind_drive(nb::module_& m) {
   nb::class_<Drive>(m, "Drive")
       .def(
           "__init__",
-          [](Drive* self, runs::Pump& pump, runs::Watch& watch, outer::OuterLaw& law, outer::Reference& reference,
-             nb::handle geometry, double t0_s, double period_s, std::int64_t ticks, const Drive::Keys& common,
-             const Drive::Keys& own) {
+          [](Drive* self, runs::Pump& pump, runs::Watch& watch, outer::OuterLaw& law,
+             outer::Reference& reference, nb::handle geometry, double t0_s, double period_s,
+             std::int64_t ticks, const Drive::Keys& common, const Drive::Keys& own) {
             outer::BelievedGeometry believed;
             outer::fields(believed, [&](const char* name, auto& value) {
               value = nb::cast<std::decay_t<decltype(value)>>(geometry.attr(name));
@@ -53,4 +53,3 @@ void bind_drive(nb::module_& m) {
   m.attr("DRIVE_TAKEN") = static_cast<int>(Drive::kTaken);
   m.attr("ASKED") = static_cast<int>(Drive::kAsked);
 }
-
