@@ -12,6 +12,9 @@ SOURCES: tuple[tuple[str, str], ...]
 # Names in a law's trace.
 TRACE_KEYS: tuple[str, ...]
 
+# So many names of its own a law in Python may have.
+OWN_TERMS_MOST: int
+
 class OuterLaw:
     """A law, or what stands around one."""
 
@@ -30,6 +33,9 @@ class Reference:
 
 def law(name: str, gains: Any, limits: Any, d0_m: float) -> OuterLaw:
     """Return the law of the class `name`; raises KeyError where it is not translated."""
+
+def python_law(law: Any, own: tuple[str, ...]) -> OuterLaw:
+    """Return a law in Python as native code asks it, with the names of its trace besides TRACE_KEYS."""
 
 def hold_at_goal(law: OuterLaw, enter_m: float, leave_m: float) -> OuterLaw: ...
 def within_wheel_speed(law: OuterLaw, geometry: Any, omega_max_rad_s: float) -> OuterLaw: ...

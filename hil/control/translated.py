@@ -3,8 +3,9 @@
 Their one source is Python: hil/control/native/outer/translate.py writes it as C++ while the extension modules
 are built, operation by operation. What is asked for here is given only where the native code is that of the
 objects it stands for: the sources are as they were translated, none of their functions has been replaced, and
-the objects are of these classes themselves with nothing of their own. Everything else runs in Python: laws
-from elsewhere, classes derived from built-in ones, blocks put around their parts, a source just edited.
+the objects are of these classes themselves with nothing of their own. Every other law runs in Python: one
+from elsewhere, a class derived from a built-in one, a block put around its parts. Native code asks it each
+tick. Where a source was just edited, or a function replaced, all of a run's ticks are Python's.
 """
 
 from __future__ import annotations
@@ -83,27 +84,34 @@ def _is_plain(made: object) -> bool:
     return not any(hasattr(kind, name) for name in vars(made))
 
 
-def native_law(law: object) -> _outer.OuterLaw | None:
-    """Return the native law that does what `law` does from its next reset on; None where there is none."""
-    if not (_as_translated() and _is_whole()):
+def native_law(law: object, own_terms: tuple[str, ...] = ()) -> _outer.OuterLaw | None:
+    """Return the native law that does what `law` does from its next reset on; None where there is none.
+
+    A law in Python under what holds for every law is asked from native code, which keeps `own_terms` of
+    its trace.
+    """
+    if not (_as_translated() and _is_whole()) or len(own_terms) > _outer.OWN_TERMS_MOST:
         return None
-    return _law(law)
+    return _law(law, own_terms)
 
 
-def _law(law: Any) -> _outer.OuterLaw | None:
+def _law(law: Any, own_terms: tuple[str, ...]) -> _outer.OuterLaw:
     kind = type(law)
-    if not _is_plain(law):
-        return None
-    if kind is StateFeedback or kind is AsgIsm:
-        blocks = kind is StateFeedback or type(law._block) is control.AsgIsm
-        if not blocks or type(law._chain) is not Chain or not _is_plain(law._chain):
-            return None
-        return _outer.law(kind.__name__, law._gains, law._limits, law._d0)
     around = _AROUND.get(kind)
-    inner = _law(law._law) if around is not None else None
-    if around is None or inner is None:
-        return None
-    return around(inner, law)
+    if around is not None and _is_plain(law):
+        return around(_law(law._law, own_terms), law)
+    if is_translated(law):
+        return _outer.law(kind.__name__, law._gains, law._limits, law._d0)
+    return _outer.python_law(law, own_terms)
+
+
+def is_translated(law: Any) -> bool:
+    """Say whether a law is one of those that are written as native code, itself and whole."""
+    kind = type(law)
+    if not (kind is StateFeedback or kind is AsgIsm) or not _is_plain(law):
+        return False
+    blocks = kind is StateFeedback or type(law._block) is control.AsgIsm
+    return blocks and type(law._chain) is Chain and _is_plain(law._chain)
 
 
 def _geometry(law: Any) -> Any:

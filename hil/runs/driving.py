@@ -1,8 +1,9 @@
 """The controlled part of a run in native code, where every part of it has a native form.
 
 The ticks are native/drive.hpp; it comes back for what only Python knows: procedures, texts of the board,
-what ends a run. Where something is looked at or changed on the way (a caller that steps, a watcher, an
-operator, a law or a reference of somebody's own), the session goes tick by tick instead: the same run.
+what ends a run, and the step of a law that is not translated. Where something is looked at or changed on the
+way (a caller that steps, a watcher, an operator, a reference of somebody's own), the session goes tick by
+tick instead: the same run.
 """
 
 from __future__ import annotations
@@ -33,10 +34,12 @@ def make_drive(
         return None
     if type(geometry) is not BelievedGeometry:
         return None
-    law, reference = native_law(parts.law), native_reference(parts.reference)
+    law = native_law(parts.law, parts.own_terms)
+    reference = native_reference(parts.reference)
     if law is None or reference is None:
         return None
-    places = {key: place for place, key in enumerate(_outer.TRACE_KEYS)}
+    known = (*_outer.TRACE_KEYS, *parts.own_terms)
+    places = {key: place for place, key in enumerate(known)}
     return _native.Drive(
         pump=intake.pump,
         watch=watch,

@@ -32,9 +32,9 @@ _STEPS = 20_000
 _DRIVING = (0.5, 0.3)  # duties of the plant alone
 
 
-# Ways in which a run may advance (hil/runs/driving.py, hil/runs/intake.py): all of it in native code, its
-# ticks in Python, what arrives taken in by Python too.
-NATIVE, TICKS, PYTHON = range(3)
+# Ways in which a run may advance (hil/runs/driving.py, hil/runs/intake.py): all of it in native code, a
+# law in Python that native code asks each tick, all ticks and arrivals in Python.
+NATIVE, ASKED, PYTHON = range(3)
 
 
 def batch_figures(runs: int) -> list[Figure]:
@@ -44,10 +44,10 @@ def batch_figures(runs: int) -> list[Figure]:
     plans: list[Plan] = []
     for what, scenario, camera, way in (
         ("pose camera, 10 s to a point", standing, "pose", NATIVE),
-        ("the same, its ticks in Python", standing, "pose", TICKS),
+        ("the same, its law in Python", standing, "pose", ASKED),
         ("the same, taken in by Python", standing, "pose", PYTHON),
         ("pose camera, 10 s on a circle", driving, "pose", NATIVE),
-        ("the circle, its ticks in Python", driving, "pose", TICKS),
+        ("the circle, its law in Python", driving, "pose", ASKED),
         ("the circle, taken in by Python", driving, "pose", PYTHON),
         ("rendered camera, 10 s to a point", standing, "rendered", PYTHON),
     ):

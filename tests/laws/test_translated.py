@@ -28,8 +28,8 @@ from hil.control.laws.turn_first import TurnFirst
 from hil.control.laws.within import WithinWheelSpeed
 from hil.control.references import Reference, make_reference
 from hil.control.vehicles.vehicle import make_vehicle
-from hil.core.types import ReferenceState
-from tests.laws.support import D0_M, estimate
+from hil.core.types import OuterCommand, ReferenceState
+from tests.laws.support import D0_M, estimate, point
 
 VEHICLE = make_vehicle(load_scenario("scenario-1").robot)
 SPEEDS = st.floats(-1.0, 1.0)
@@ -132,7 +132,7 @@ def test_a_native_law_is_its_python_source(law, limits, steps, *, p, cost, start
     """Commands and traces are equal to the bit, whatever limits, gains and steps are drawn."""
     made = stacked(law, gains_of(law, p, cost, start), limits, within_rad_s)
     twin = translated.native_law(made)
-    assert twin is not None
+    assert translated.is_translated(made._law._law._law._law)
     assert unequal(made, twin, steps) == []
 
 
@@ -182,17 +182,78 @@ def shipped(kind=AsgIsm):
     return kind(ControlConfig().active_gains.asg_ism, OuterLimits(), D0_M)
 
 
-def test_what_is_not_the_class_itself_has_no_native_law():
-    """Derived classes, blocks with a part off, replaced methods of one object: all stay in Python."""
-    assert translated.native_law(shipped()) is not None
-    assert translated.native_law(shipped(Derived)) is None
-    assert translated.native_law(HoldAtGoal(shipped(Derived), OuterLimits())) is None
+def test_what_is_not_the_class_itself_is_not_taken_for_it():
+    """Derived classes, blocks with a part off, replaced methods of one object: all are asked in Python."""
+    assert translated.is_translated(shipped())
+    assert not translated.is_translated(shipped(Derived))
     ablated = shipped()
     replace_block(ablated, WithoutKappa)
-    assert translated.native_law(ablated) is None
+    assert not translated.is_translated(ablated)
     patched = shipped()
     patched.step = lambda *_: None
-    assert translated.native_law(patched) is None
+    assert not translated.is_translated(patched)
+
+
+@settings(max_examples=30, deadline=None)
+@given(steps=STEPS, limits=LIMITS)
+def test_native_code_asks_a_law_in_python_the_same(steps, limits):
+    """Under what holds for every law, a derived law gives the same commands and traces to the bit."""
+    gains = gains_of("asg-ism", 1.0, "norm", None)
+
+    def made():
+        bounded = WithinWheelSpeed(HoldAtGoal(Derived(gains, limits, D0_M), limits), VEHICLE, 6.0)
+        return LetGo(TurnFirst(bounded, limits.turn_missing_rad_s), VEHICLE, limits.let_go_rad_s)
+
+    assert unequal(made(), translated.native_law(made()), steps) == []
+
+
+class Traced:
+    """A law whose trace is its own; `trace` is what it gives."""
+
+    def __init__(self, trace):
+        self.trace = trace
+        self.asked = []
+
+    def reset(self, reference, estimate):
+        self.asked.append((reference, estimate))
+
+    def step(self, reference, estimate, dt_s):
+        assert dt_s > 0.0
+        self.asked.append((reference, estimate))
+        return OuterCommand(0.1, 0.2, self.trace)
+
+
+def test_a_law_in_python_is_given_values_as_python_makes_them():
+    """Reference and estimate are equal to those that a session makes, and of the same classes."""
+    law = Traced({})
+    native = translated.native_law(law)
+    reference, here = (
+        ReferenceState((1.0, 2.0), (0.1, 0.2), (0.3, 0.4), (0.5, 0.6)),
+        estimate(0.1, w=0.3),
+    )
+    here = replace(here, sides_at_limit=(1, -1), driven_hard=True)
+    native.reset(reference, here)
+    assert law.asked == [(reference, here)]
+    assert [type(value) for value in law.asked[0]] == [type(reference), type(here)]
+
+
+def test_an_error_of_a_law_in_python_comes_through_native_code():
+    """What a law raises, or gives that is no number, is raised as it is."""
+    law = Traced({"eps": "much"})
+    native = translated.native_law(law)
+    with pytest.raises(TypeError, match="must be real number"):
+        native.step(point(0, 0), estimate(), 0.1)
+    law.step = None
+    law.reset = lambda *_: 1 / 0
+    with pytest.raises(ZeroDivisionError):
+        translated.native_law(law).reset(point(0, 0), estimate())
+
+
+def test_a_law_with_more_names_than_there_is_room_for_stays_in_python():
+    """Its own names take a place each."""
+    names = tuple(f"term_{k}" for k in range(_outer.OWN_TERMS_MOST + 1))
+    assert translated.native_law(Traced({}), names) is None
+    assert translated.native_law(Traced({}), names[1:]) is not None
 
 
 @pytest.mark.parametrize("name", ["damped_inverse", "clip", "Chain"])

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "outer_laws.hpp"
+#include "python_law.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -119,6 +120,12 @@ void bind_laws(nb::module_& m) {
           },
           "reference"_a, "estimate"_a, "dt_s"_a);
   using Law = std::unique_ptr<OuterLaw>;
+  m.def(
+      "python_law",
+      [](const nb::object& law, const nb::tuple& own) -> Law {
+        return std::make_unique<PythonLaw>(law, own);
+      },
+      "law"_a, "own"_a);
   m.def("law", &law_of, "name"_a, "gains"_a, "limits"_a, "d0_m"_a);
   m.def(
       "hold_at_goal",
@@ -201,6 +208,7 @@ NB_MODULE(_outer, m) {
   for (const char* key : outer::kTraceKeys) names.append(key);
   for (const auto& [path, hash] : outer::kSources) sources.append(nb::make_tuple(path, hash));
   m.attr("TRACE_KEYS") = nb::tuple(names);
+  m.attr("OWN_TERMS_MOST") = static_cast<int>(outer::kTraceSlots - outer::kTraceSize);
   m.attr("SOURCES") = nb::tuple(sources);
   bind_laws(m);
   bind_references(m);

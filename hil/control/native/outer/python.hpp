@@ -137,9 +137,10 @@ bool is_none(const Opt<T>& value) {
 }
 }  // namespace m
 
-constexpr std::size_t kTraceSize = 14;  // names of a law's trace, in all laws
+constexpr std::size_t kTraceSize = 14;   // names of a law's trace, in all translated laws
+constexpr std::size_t kTraceSlots = 32;  // with those of a law of somebody's own behind them
 
-// A law's trace: for each of kTraceKeys a number, or nothing.
+// A law's trace: for each of kTraceKeys, and of the names of its own, a number or nothing.
 class Trace {
  public:
   Trace&& with(std::size_t key, double value) && {
@@ -150,7 +151,7 @@ class Trace {
   // The value by that key, NaN for none.
   double get(std::size_t key) const { return (has_ >> key & 1U) != 0 ? values_[key] : m::nan; }
   friend Trace operator|(Trace a, const Trace& b) {  // of both, that of b
-    for (std::size_t key = 0; key < kTraceSize; ++key) {
+    for (std::size_t key = 0; key < kTraceSlots; ++key) {
       if ((b.has_ >> key & 1U) != 0) a.values_[key] = b.values_[key];
     }
     a.has_ |= b.has_;
@@ -158,7 +159,7 @@ class Trace {
   }
 
  private:
-  std::array<double, kTraceSize> values_{};
+  std::array<double, kTraceSlots> values_{};
   std::uint32_t has_ = 0;
 };
 

@@ -3,8 +3,8 @@
 Run while the extension modules are built (CMakeLists.txt beside it); no other code calls it. The Python
 source is the one source: it is what is read, changed, subclassed and stepped one tick at a time. The C++
 made of it (hil/core/to_cpp) has the same operations in the same order, so that a run that advances in native
-code is the same run to the bit; hashes of the sources go into it, and a source that has changed since is run in Python
-(hil/control/translated.py).
+code is the same run to the bit. Hashes of the sources go into it: where one has changed since, a run is made
+in Python (hil/control/translated.py).
 """
 
 from __future__ import annotations
