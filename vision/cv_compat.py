@@ -294,12 +294,6 @@ def rotation(vector: ArrayLike) -> Array:
     return np.asarray(matrix, dtype=np.float64)
 
 
-def rotation_vector(matrix: ArrayLike) -> Array:
-    """Return the rotation vector (3,) of a rotation matrix (3, 3)."""
-    vector, _ = cv2.Rodrigues(np.asarray(matrix, dtype=np.float64).reshape(3, 3))
-    return _flat(vector)
-
-
 def _flat(array: ArrayLike) -> Array:
     return np.asarray(array, dtype=np.float64).ravel()
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+import scipy
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
@@ -123,7 +123,7 @@ def student_reach(samples: Array) -> Array:
     size = samples.shape[1]
     spread = samples.std(axis=1, ddof=1)
     spread[spread <= _ROUNDING * np.abs(samples).max(axis=1)] = 0.0
-    quantile = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, size - 1))
+    quantile = float(scipy.stats.t.ppf(0.5 + 0.5 * CONFIDENCE, size - 1))
     return np.asarray(quantile * spread / math.sqrt(size), np.float64)
 
 
@@ -170,7 +170,7 @@ def share_interval(baseline: Array, other: Array) -> Interval:
     gained, lost = float((other > baseline).sum()) + 0.5, float((other < baseline).sum()) + 0.5
     middle = (gained - lost) / size
     error = math.sqrt(((gained + lost) / size - middle**2) / size)
-    reach = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE)) * error
+    reach = float(scipy.stats.norm.ppf(0.5 + 0.5 * CONFIDENCE)) * error
     return Interval(max(middle - reach, -1.0), min(middle + reach, 1.0))
 
 
@@ -181,11 +181,11 @@ def median_interval(values: Array) -> tuple[Interval, float]:
     below 6 values, where none does.
     """
     size = values.size
-    rank = int(stats.binom.ppf(0.5 * (1.0 - CONFIDENCE), size, 0.5)) if size else 0
+    rank = int(scipy.stats.binom.ppf(0.5 * (1.0 - CONFIDENCE), size, 0.5)) if size else 0
     if rank < 1 or size < 6:
         return UNKNOWN, math.nan
     ordered = np.sort(values)
-    holds = 1.0 - 2.0 * float(stats.binom.cdf(rank - 1, size, 0.5))
+    holds = 1.0 - 2.0 * float(scipy.stats.binom.cdf(rank - 1, size, 0.5))
     return Interval(float(ordered[rank - 1]), float(ordered[size - rank])), holds
 
 
@@ -233,7 +233,7 @@ def crossed_interval(
     freedom = (by_row + by_column) ** 2 / (
         by_row**2 / (parts[0].size - 1) + by_column**2 / (parts[1].size - 1)
     )
-    reach = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, freedom)) * math.sqrt(variance)
+    reach = float(scipy.stats.t.ppf(0.5 + 0.5 * CONFIDENCE, freedom)) * math.sqrt(variance)
     return Interval(mean - reach, mean + reach)
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import optimize, stats
+import scipy
 
 from hil.analysis.intervals import CONFIDENCE, Interval, mean_interval
 from hil.core.errors import BadInput
@@ -31,7 +31,7 @@ def adjusted_p(p_values: Sequence[float]) -> list[float]:
     known = np.isfinite(values)
     result = np.full(values.shape, math.nan)
     if known.any():
-        result[known] = stats.false_discovery_control(values[known], method="bh")
+        result[known] = scipy.stats.false_discovery_control(values[known], method="bh")
     return [float(value) for value in result]
 
 
@@ -87,12 +87,12 @@ def equivalence(difference: Sequence[float], margin: float) -> Equivalence:
         return Equivalence(margin, Interval(math.nan, math.nan), math.nan, math.nan)
     mean, freedom = float(values.mean()), values.size - 1
     error = float(values.std(ddof=1)) / math.sqrt(values.size)
-    reach = float(stats.t.ppf(CONFIDENCE, freedom)) * error
+    reach = float(scipy.stats.t.ppf(CONFIDENCE, freedom)) * error
     if error == 0.0:
         above, below = float(mean >= margin), float(mean <= -margin)
     else:
-        above = float(stats.t.cdf((mean - margin) / error, freedom))
-        below = float(stats.t.sf((mean + margin) / error, freedom))
+        above = float(scipy.stats.t.cdf((mean - margin) / error, freedom))
+        below = float(scipy.stats.t.sf((mean + margin) / error, freedom))
     return Equivalence(margin, Interval(mean - reach, mean + reach), max(above, below), above)
 
 
@@ -137,10 +137,10 @@ def power(effect: float, pairs: int) -> float:
     """
     if pairs < 2:
         return 0.0
-    edge = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, pairs - 1))
+    edge = float(scipy.stats.t.ppf(0.5 + 0.5 * CONFIDENCE, pairs - 1))
     shift = abs(effect) * math.sqrt(pairs)
-    above = float(stats.nct.sf(edge, pairs - 1, shift))
-    below = float(stats.nct.cdf(-edge, pairs - 1, shift))
+    above = float(scipy.stats.nct.sf(edge, pairs - 1, shift))
+    below = float(scipy.stats.nct.cdf(-edge, pairs - 1, shift))
     return above + (below if math.isfinite(below) else 0.0)
 
 
@@ -155,7 +155,7 @@ def pairs_needed(difference: float, sd: float, wanted: float = 0.8) -> int:
             "than 0, an sd above 0 (of the paired differences) and a power between 0.05 and 1"
         )
     effect = abs(difference) / sd
-    normal = (stats.norm.ppf(0.5 + 0.5 * CONFIDENCE) + stats.norm.ppf(wanted)) / effect
+    normal = (scipy.stats.norm.ppf(0.5 + 0.5 * CONFIDENCE) + scipy.stats.norm.ppf(wanted)) / effect
     if normal**2 > MOST_PAIRS:
         raise BadInput(f"difference = {difference:g}: needs more than {MOST_PAIRS:,} pairs")
     pairs = max(int(normal**2), 2)
@@ -170,7 +170,7 @@ def difference_seen(sd: float, pairs: int, wanted: float = 0.8) -> float:
     """Return the least mean difference that `pairs` pairs show with probability `wanted`."""
     if pairs < 2:
         return math.inf
-    effect = optimize.brentq(lambda x: power(x, pairs) - wanted, 1e-6, 60.0)
+    effect = scipy.optimize.brentq(lambda x: power(x, pairs) - wanted, 1e-6, 60.0)
     return float(effect) * sd
 
 

@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from hil.analysis.intervals import (
     CONFIDENCE,
@@ -226,7 +226,7 @@ def _rank_p(difference: Array) -> float:
         return math.nan if difference.size < 2 else 1.0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # ties make the p approximate, which it may be
-        return float(stats.wilcoxon(difference).pvalue)
+        return float(scipy.stats.wilcoxon(difference).pvalue)
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,8 +257,10 @@ def adjusted(difference: Sequence[float], covariate: Sequence[float]) -> Adjuste
     y, x = y[known], x[known]
     if y.size < 4 or np.ptp(x) == 0.0:
         return None
-    fit = stats.linregress(x, y)
-    reach = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, y.size - 2)) * float(fit.intercept_stderr)
+    fit = scipy.stats.linregress(x, y)
+    reach = float(scipy.stats.t.ppf(0.5 + 0.5 * CONFIDENCE, y.size - 2)) * float(
+        fit.intercept_stderr
+    )
     middle = float(fit.intercept)
     return Adjusted(middle, Interval(middle - reach, middle + reach), float(fit.slope))
 

@@ -48,6 +48,7 @@ def command(
     table's (false discovery rate of 5 %) and its 95 % interval is free of 0. docs/verdict.md.
     """
     from hil.config.deck import load_deck
+    from hil.config.gain_file import read_gain_file
     from hil.core.errors import BadInput
     from hil.core.registries import OUTER_LAWS
     from hil.study.ablation import ablate
@@ -65,7 +66,7 @@ def command(
     chosen = load_deck(deck)
     where = spread_over(chosen.unseen_cells() or chosen.cells(), cells)
     scenarios = scenarios_of(chosen, where)
-    given = None if gains is None else _gain_set(gains)
+    given = None if gains is None else read_gain_file(gains, "--gains")
     with Pool(OnSuite(scenarios), workers or os.cpu_count() or 1) as pool:
 
         def make(jobs: Any) -> Any:
@@ -86,21 +87,6 @@ def command(
         print_json({"deck": deck, "cells": names, "rows": [row.to_json() for row in rows]})
         return
     _print(rows, len(where), repeats)
-
-
-def _gain_set(path: Path) -> Any:
-    from pydantic import ValidationError
-
-    from hil.config.gains import make_gains
-    from hil.core.errors import BadInput
-    from hil.core.files import read_toml
-
-    try:
-        return make_gains(read_toml(path))
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(map(str, first["loc"]))
-        raise BadInput(f"--gains {path}: {where}: {first['msg']}") from None
 
 
 def _print(rows: list[Worth], cells: int, repeats: int) -> None:

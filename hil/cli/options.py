@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -74,6 +75,12 @@ def plain_console() -> Console:
     from rich.console import Console
 
     return Console(highlight=False, soft_wrap=True, markup=False)
+
+
+def tell(text: str) -> None:
+    """Write a line to stdout; its styles are kept on a terminal, and as NO_COLOR or FORCE_COLOR say."""
+    colours = False if os.environ.get("NO_COLOR") else bool(os.environ.get("FORCE_COLOR")) or None
+    click.echo(text, color=colours)
 
 
 def print_json(document: dict[str, Any]) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,9 +17,18 @@ if TYPE_CHECKING:
 Update = Callable[[str, float], None]
 
 
+def _may_be_a_terminal() -> bool:
+    """Say whether stderr may show bars; where it cannot, what draws them need not be loaded."""
+    asked_for = {"FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"}
+    return sys.stderr.isatty() or not asked_for.isdisjoint(os.environ)
+
+
 @contextmanager
 def run_progress(durations_s: Mapping[str, float]) -> Iterator[Update]:
     """Show one bar per run; `update(name, t_s)` moves it. Nothing is shown off a terminal."""
+    if not _may_be_a_terminal():
+        yield lambda _name, _t_s: None
+        return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 

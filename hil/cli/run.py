@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,11 +18,11 @@ from hil.cli.options import (
     json_option,
     out_option,
     outer_option,
-    plain_console,
     print_json,
     seed_option,
     set_option,
     target_option,
+    tell,
     with_figures,
 )
 from hil.cli.progress import run_progress
@@ -78,6 +78,7 @@ def command(
     """
     from hil.config.load import load_scenario
     from hil.core.registries import OUTER_LAWS
+    from hil.record.beside import ViewerFile
     from hil.record.manifest import command_line
     from hil.runs.execute import RunSpec, camera_for, execute, exit_status, new_folder
 
@@ -99,11 +100,14 @@ def command(
         command=command_line(),
     )
     with (
+        ViewerFile() if spec.is_simulated else nullcontext() as viewer,
         junit_file(junit, f"{resolved.name}.{law.name}"),
         run_progress({resolved.name: resolved.duration_s}) as update,
         _ground_stations(bridge) as publish,
     ):
-        record = execute(spec, lambda t_s: update(resolved.name, t_s), publish=publish)
+        record = execute(
+            spec, lambda t_s: update(resolved.name, t_s), publish=publish, viewer=viewer
+        )
     tell_ci([record], f"hil run {resolved.name}", junit=junit)
     if as_json:
         print_json(summary(record))
@@ -159,24 +163,21 @@ def _finite(value: float) -> float | None:
 
 def print_summary(record: RunRecord) -> None:
     """Write outcome, requirements and the place of the record to stdout."""
-    from rich.text import Text
-
-    console = plain_console()
     manifest = record.manifest
     line = (
         f"{manifest.scenario_name} on {manifest.target}, outer {manifest.outer}, "
         f"inner {manifest.inner}, seed {manifest.seed}: {manifest.outcome}"
     )
-    console.print(visible(line + said(manifest.outcome_detail)))
+    tell(visible(line + said(manifest.outcome_detail)))
     for item in record.verdicts():
-        mark = ("holds", "green") if item.holds else ("FAILS", "red")
+        mark = click.style("holds", "green") if item.holds else click.style("FAILS", "red")
         is_now = f"is {item.value:.4g}" if math.isfinite(item.value) else "has no value in this run"
-        console.print(Text.assemble("  ", mark, f"  {item.text()}   ({is_now})"))
+        tell(f"  {mark}  {item.text()}   ({is_now})")
     for note in manifest.notes:
-        console.print(Text.assemble(("note:", "yellow"), f" {visible(note)}"))
+        tell(f"{click.style('note:', 'yellow')} {visible(note)}")
     for text in record.diagnoses():
-        console.print(Text.assemble(("diagnosis:", "yellow"), f" {visible(text)}"))
-    console.print(f"record: {visible(str(record.path))}")
+        tell(f"{click.style('diagnosis:', 'yellow')} {visible(text)}")
+    tell(f"record: {visible(str(record.path))}")
 
 
 def said(detail: str) -> str:

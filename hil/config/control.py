@@ -9,6 +9,7 @@ from pydantic import (
     Field,
     SerializeAsAny,
     ValidationInfo,
+    WithJsonSchema,
     field_validator,
     model_validator,
 )
@@ -20,7 +21,13 @@ from hil.core.errors import BadInput
 from hil.core.registries import ESTIMATORS, OUTER_LAWS, REFERENCES
 from hil.core.registry import Entry
 
-GainSetName = Literal["tuned", "thesis"]
+# Where it is read, a file in its place is laid over the tuned set (hil/config/gain_file.py).
+GainSetName = Annotated[
+    Literal["tuned", "thesis"],
+    WithJsonSchema(
+        {"anyOf": [{"enum": ["tuned", "thesis"]}, {"type": "string", "pattern": r"\.toml$"}]}
+    ),
+]
 
 
 OuterLawName = Annotated[str, known_name(OUTER_LAWS)]
@@ -220,7 +227,9 @@ class ControlConfig(Section):
         default_factory=dict, validate_default=True, description="values of the estimator's own"
     )
     limits: OuterLimits = Field(default_factory=OuterLimits, description="restrictions, both laws")
-    gain_set: GainSetName = Field("tuned", description="set of gains in use")
+    gain_set: GainSetName = Field(
+        "tuned", description="set of gains in use, or a file that lies on tuned"
+    )
     gains: GainSets = Field(default_factory=GainSets.from_files, description="the named sets")
     fusion: EstimatorConfig = Field(
         default_factory=EstimatorConfig, description="what the estimator assumes"

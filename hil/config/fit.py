@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from hil.board._firmware import ENCODER_COUNTS_1_S
 from hil.board.wheel_laws import WHEEL_LAWS
-from hil.config.limits import board_defaults, board_table, check_board, check_edges
+from hil.config.limits import board_defaults, board_table
 from hil.config.mismatch import true_robot
 from hil.core.errors import BadInput
 
@@ -23,11 +23,10 @@ _PERIOD_SHARE = 0.8
 def check_fit(scenario: Scenario) -> None:
     """Raise BadInput where values that are allowed one by one cannot work together."""
     board = board_defaults() | scenario.board
-    true_robot(scenario)  # the mismatch names numbers of the robot and keeps them in their bounds
-    check_board(scenario.board)
     _check_counts(scenario, board)
     _check_board_pairs(scenario, board)
     _check_battery(scenario, board)
+    true_robot(scenario)  # the mismatch names numbers of the robot and keeps them in their bounds
 
 
 def board_parameters(scenario: Scenario, inner: str) -> dict[str, float]:
@@ -36,7 +35,7 @@ def board_parameters(scenario: Scenario, inner: str) -> dict[str, float]:
         "ENC_COUNTS": float(scenario.robot.encoder_counts_per_turn),
         "LAW": WHEEL_LAWS[inner],
     }
-    check_edges(parameters)
+    _check_counts(scenario, board_defaults() | parameters)
     return parameters
 
 

@@ -11,13 +11,9 @@ import difflib
 import math
 from collections.abc import Mapping
 from functools import cache
-from typing import TYPE_CHECKING
 
 from hil.board._firmware import ENCODER_COUNTS_1_S, Parameter, parameter_table
 from hil.core.errors import BadInput
-
-if TYPE_CHECKING:
-    from hil.config.scenario import Scenario
 
 
 @cache
@@ -46,9 +42,9 @@ def check_board(values: Mapping[str, float]) -> None:
             )
 
 
-def wheel_speed_max_rad_s(scenario: Scenario) -> float:
+def wheel_speed_max_rad_s(board: Mapping[str, float]) -> float:
     """Return the largest wheel speed that the board accepts as a set-point."""
-    return scenario.board.get("W_MAX", board_table()["W_MAX"].default)
+    return board.get("W_MAX", board_table()["W_MAX"].default)
 
 
 def check_edges(values: Mapping[str, float]) -> None:

@@ -14,8 +14,9 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from hil.config.fields import told
+from hil.config.gain_file import GAIN_SET, fill_gains, lay_gains
 from hil.config.gains import shipped_gains
-from hil.config.limits import board_defaults, check_board
+from hil.config.limits import board_defaults
 from hil.config.own_settings import BY_NAME_KEY, PLACES, model_at, renew
 from hil.config.path_file import fill_path
 from hil.config.robot import RobotConfig
@@ -54,10 +55,7 @@ def load_scenario(name_or_path: str, overrides: Sequence[str] = ()) -> Scenario:
     _fill_board(tree)
     _lay_over_shipped_gains(tree)
     scenario = build(Scenario, tree, name_or_path)
-    if overrides:
-        return with_overrides(scenario, overrides)
-    check_board(scenario.board)
-    return scenario
+    return with_overrides(scenario, overrides)
 
 
 def _lay_over_shipped_gains(tree: Tree) -> None:
@@ -77,16 +75,13 @@ def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
         tree = _with_file(tree, text)
     if files_named:  # with every value that a file leaves at its default
         tree = build(Scenario, tree, "--set").model_dump(mode="json")
-    # A name first: which settings there are depends on it.
-    for text in sorted(
-        overrides, key=lambda text: text.partition("=")[0].strip() not in BY_NAME_KEY
-    ):
+    # A name first: which settings there are, and what lies below them, depends on it.
+    names = {*BY_NAME_KEY, GAIN_SET}
+    for text in sorted(overrides, key=lambda text: text.partition("=")[0].strip() not in names):
         if text not in files_named:
             set_value(tree, text)
     _fill_board(tree)
-    changed = build(Scenario, tree, "--set")
-    check_board(changed.board)
-    return changed
+    return build(Scenario, tree, "--set")
 
 
 def _part_of(text: str) -> str | None:
@@ -141,6 +136,7 @@ def read_tree(name_or_path: str, kind: str, above: tuple[str, ...] = ()) -> Tree
             tree[part] = merge(below, own)
     _set_files_beside(tree, folder)
     fill_path(tree, folder)
+    fill_gains(tree, folder)
     base = tree.pop("base", None)
     if base is not None:
         below = read_tree(_beside(folder, str(base)), _base_kind(str(base), kind), above)
@@ -258,6 +254,8 @@ def put_value(tree: Tree, key: str, value: Any) -> None:
     """Put a value where the dotted name says, in place; an unknown one is a BadInput."""
     if key in _BY_OPTION:
         raise BadInput(f"--set {key}: an option decides it; use {_BY_OPTION[key]} (or its list)")
+    if key == GAIN_SET and lay_gains(tree, value):
+        return
     place = BY_NAME_KEY.get(key)
     if place is not None and place.registry.get(str(value)).name != _find_value(tree, key):
         renew(tree, place, value)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, SerializeAsAny, model_validator
+from pydantic import AfterValidator, Field, SerializeAsAny, field_validator, model_validator
 
 from hil.config.base import PlainName, Section, quantity
 from hil.config.camera import CameraConfig
 from hil.config.control import ControlConfig, ReferenceConfig
 from hil.config.events import Disturbance, Fault
+from hil.config.limits import check_board
 from hil.config.link import LinkConfig
 from hil.config.robot import RobotConfig
 from hil.core.errors import BadInput
@@ -134,6 +135,13 @@ class Scenario(Section):
     safety: SafetyConfig = SafetyConfig()
     disturbances: tuple[Disturbance, ...] = ()
     faults: tuple[Fault, ...] = ()
+
+    @field_validator("board")
+    @classmethod
+    def _the_board_takes_them(cls, values: dict[str, float]) -> dict[str, float]:
+        """Raise BadInput for a parameter that the board does not have, or not with that value."""
+        check_board(values)
+        return values
 
     @property
     def own_figures(self) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from hil.console.child import begin, ordered, tell
 from hil.console.hand_over import HEAD, PICTURE
 from hil.console.orders import camera_of
-from hil.console.setup import BOARD, CAMERA_FILE, PICTURES, SETS
+from hil.console.set_up_files import BOARD, CAMERA_FILE, PICTURES, SETS
 from hil.core.errors import BadInput
 from hil.core.text import visible
 

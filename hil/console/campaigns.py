@@ -12,28 +12,16 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from starlette.requests import Request
-from starlette.responses import FileResponse, Response
-
-from hil.config.load import builtin_names
-from hil.console.access import REPORT_POLICY
 from hil.console.folders import Folders, confined
 from hil.console.people import Page, People
-from hil.console.records import answer_json, body_of
 from hil.core.errors import BadInput
 from hil.core.text import visible
-from hil.runs.execute import new_folder
 from hil.study.campaign.results import CAMPAIGN, PAGE, PARTS, RESULTS
 
-if TYPE_CHECKING:
-    from hil.console.server import Console
-
-Answer = Callable[[Request, "Console"], Awaitable[Response]]
 _LOOK_S = 1.0
 _KEPT_CHARACTERS = 4000
 _SOURCE = "console.json"  # beside a campaign's own files: which file it was started from
@@ -222,57 +210,9 @@ def rows_of(folder: Path) -> dict[str, Any]:
     return {"axes": axes, "rows": rows[:50_000]}
 
 
-def _folder(name: object, folders: Folders) -> Path:
+def folder_of(name: object, folders: Folders) -> Path:
+    """Return the folder of a campaign by its name; raises BadInput."""
     path = confined(folders.root, str(name))
     if not (path / CAMPAIGN).is_file():
         raise BadInput(f"campaign {visible(str(name))}: there is none of this name")
     return path
-
-
-async def _list(_request: Request, console: Console) -> Response:
-    return answer_json({"items": await asyncio.to_thread(console.campaigns.items)})
-
-
-async def _map(request: Request, console: Console) -> Response:
-    folder = _folder(request.query_params.get("name", ""), console.folders)
-    return answer_json(await asyncio.to_thread(rows_of, folder))
-
-
-async def _page(request: Request, console: Console) -> Response:
-    folder = _folder(request.query_params.get("name", ""), console.folders)
-    return FileResponse(
-        folder / PAGE, media_type="text/html; charset=utf-8",
-        headers={"Content-Security-Policy": REPORT_POLICY},
-    )  # fmt: skip
-
-
-async def _start(request: Request, console: Console) -> Response:
-    name = str((await body_of(request)).get("campaign", ""))
-    if name not in builtin_names("campaigns"):
-        name = str(console.folders.work_file(name, ".toml"))
-    folder = new_folder(f"sweep-{Path(name).stem}", console.folders.root)
-    await console.campaigns.start(name, folder)
-    return answer_json({"name": folder.name})
-
-
-async def _stop(request: Request, console: Console) -> Response:
-    console.campaigns.stop(str((await body_of(request)).get("name", "")))
-    return answer_json({})
-
-
-async def _go_on(request: Request, console: Console) -> Response:
-    folder = _folder((await body_of(request)).get("name", ""), console.folders)
-    await console.campaigns.start(console.campaigns.source_of(folder.name), folder)
-    return answer_json({"name": folder.name})
-
-
-LOOKED_AT: dict[str, Answer] = {
-    "/api/campaigns": _list,
-    "/api/campaign-map": _map,
-    "/api/campaign-report": _page,
-}
-CHANGED: dict[str, Answer] = {
-    "/api/campaign-start": _start,
-    "/api/campaign-stop": _stop,
-    "/api/campaign-go-on": _go_on,
-}

@@ -4,59 +4,28 @@ from __future__ import annotations
 
 import asyncio
 import tempfile
-from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from starlette.background import BackgroundTask
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
 from hil.console.access import REPORT_POLICY
+from hil.console.answers import answer_json, body_of, names_of, number
 from hil.console.folders import in_bin, out_of_bin
 from hil.console.listing import Wanted
-from hil.console.people import encoded
 from hil.console.reports import report_file
 from hil.console.tasks import required
 from hil.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from hil.console.server import Console
+    from hil.console.shared import Answer, Console
 
-Answer = Callable[[Request, "Console"], Awaitable[Response]]
 _PAGE = 100
 _MOST = 500
 _COMPARED = 24
 _SUFFIX = {"csv": ".csv", "mcap": ".mcap", "ulog": ".ulg"}
-
-
-def answer_json(tree: Any) -> Response:
-    """Return a JSON answer."""
-    return Response(encoded(tree), media_type="application/json")
-
-
-def number(text: str, default: int, low: int, high: int) -> int:
-    """Return a number of a query, within bounds."""
-    return min(max(int(text), low), high) if text.isdecimal() and len(text) < 9 else default
-
-
-async def body_of(request: Request) -> dict[str, Any]:
-    """Return the JSON object that a page sent; raises BadInput."""
-    try:
-        tree = await request.json()
-    except ValueError:
-        raise BadInput("not understood: no JSON") from None
-    if not isinstance(tree, dict):
-        raise BadInput("not understood: no table")
-    return tree
-
-
-def names_of(tree: dict[str, Any]) -> list[str]:
-    """Return the names of records in what a page sent; raises BadInput."""
-    names = tree.get("names")
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise BadInput("not understood: names of records are wanted")
-    return names
 
 
 async def _list(request: Request, console: Console) -> Response:

@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable
-from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any
 
@@ -18,17 +17,21 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from hil.console import campaigns, records, setup, tuning
+from hil.console import campaign_routes, records, setup
 from hil.console.access import HEADERS, PAGE_POLICY, Gate
+from hil.console.answers import answer_json
 from hil.console.bringup import BringUps
 from hil.console.cameras import Cameras
+from hil.console.campaigns import Campaigns
 from hil.console.choices import choices, describe, is_built_in
 from hil.console.folders import Folders
 from hil.console.listing import Listing
 from hil.console.live import Live, name_of
 from hil.console.orders import order_of
-from hil.console.people import Page, People, encoded
+from hil.console.people import Page, People
+from hil.console.shared import Console
 from hil.console.tasks import Tasks, required
+from hil.console.tuning import write_tuned
 from hil.core.errors import BadInput, HilError
 
 _TYPES = {
@@ -39,27 +42,6 @@ _TYPES = {
 }
 _CLOSED = 4401
 _WORDS = 80  # of a page's own key
-
-
-@dataclass(slots=True)
-class Console:
-    """Everything that the routes share."""
-
-    folders: Folders
-    gate: Gate
-    people: People
-    live: Live
-    listing: Listing
-    tasks: Tasks
-    campaigns: campaigns.Campaigns
-    bringups: BringUps
-    cameras: Cameras
-    begins_with: tuple[str, str]  # target and camera
-
-
-def json_of(tree: Any, status: int = 200) -> Response:
-    """Return a JSON answer."""
-    return Response(encoded(tree), status, media_type="application/json")
 
 
 class Guard:
@@ -125,13 +107,13 @@ def said_plainly(
     async def route(request: Request) -> Response:
         console: Console = request.app.state.console
         if changes and request.headers.get("x-console-page", "") != console.people.operator:
-            return json_of({"error": "only the operator's page may do that"}, 409)
+            return answer_json({"error": "only the operator's page may do that"}, 409)
         try:
             return await answer(request, console)
         except HilError as error:
-            return json_of({"error": str(error)}, 400)
+            return answer_json({"error": str(error)}, 400)
         except OSError as error:
-            return json_of({"error": f"{error.filename or ''}: {error.strerror or error}"}, 500)
+            return answer_json({"error": f"{error.filename or ''}: {error.strerror or error}"}, 500)
 
     return route
 
@@ -156,16 +138,16 @@ def _static_file(name: str) -> Response:
 async def _choices(_request: Request, console: Console) -> Response:
     found = await asyncio.to_thread(choices, console.folders)
     target, camera = console.begins_with
-    return json_of(found | {"target": target, "camera": camera})
+    return answer_json(found | {"target": target, "camera": camera})
 
 
 async def _scenario(request: Request, console: Console) -> Response:
     name = request.query_params.get("name", "")
     if is_built_in(name):
-        return json_of(await asyncio.to_thread(describe, name))
+        return answer_json(await asyncio.to_thread(describe, name))
     path = console.folders.work_file(name, ".toml")
     said = await console.tasks.module("hil.console.choices", str(path))
-    return json_of(json.loads(required(said).out))
+    return answer_json(json.loads(required(said).out))
 
 
 async def _socket(socket: WebSocket) -> None:
@@ -271,7 +253,7 @@ def application(
     live = Live(folders, people)
     console = Console(
         folders, gate, people, live, Listing(folders), tasks,
-        campaigns.Campaigns(folders, people), BringUps(folders, people),
+        Campaigns(folders, people), BringUps(folders, people),
         Cameras(folders, people), begins_with,
     )  # fmt: skip
 
@@ -310,5 +292,21 @@ def application(
     return app
 
 
-_LOOKED_AT = records.LOOKED_AT | setup.LOOKED_AT | campaigns.LOOKED_AT
-_CHANGED = records.CHANGED | setup.CHANGED | campaigns.CHANGED | tuning.CHANGED
+async def _write_tuned(_request: Request, console: Console) -> Response:
+    """Write what was changed in the run that is on, or was."""
+    live = console.live
+    if live.order is None or not live.tuning.moved():
+        raise BadInput("tuning: nothing was changed, so that there is nothing to write")
+    place = write_tuned(
+        console.folders, live.order, live.begun["law"],
+        live.begun["scenario"]["control"]["gain_set"], live.tuning.moved(),
+    )  # fmt: skip
+    return answer_json(
+        {"file": console.folders.name_of(place), "text": place.read_text(encoding="utf-8")}
+    )
+
+
+_LOOKED_AT = records.LOOKED_AT | setup.LOOKED_AT | campaign_routes.LOOKED_AT
+_CHANGED = (
+    records.CHANGED | setup.CHANGED | campaign_routes.CHANGED | {"/api/write-tuned": _write_tuned}
+)

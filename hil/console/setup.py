@@ -8,31 +8,26 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
+from hil.console.answers import answer_json, body_of
 from hil.console.folders import Folders, confined
-from hil.console.records import answer_json, body_of
+from hil.console.set_up_files import BOARD, CAMERA_FILE, DRAWN, PICTURES, SETS, SUFFIXES
 from hil.console.tasks import required
 from hil.core.errors import BadInput
 from hil.core.files import replace_file
 from hil.core.text import visible
 
 if TYPE_CHECKING:
-    from hil.console.server import Console
+    from hil.console.shared import Answer, Console
 
-Answer = Callable[[Request, "Console"], Awaitable[Response]]
-PICTURES, CAMERA_FILE, DRAWN = "pictures", "camera.toml", "drawn"
-SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff")
 _PICTURE_BYTES = 40_000_000
 _PICTURES_MOST = 200
 _NAME = re.compile(r"[\w][\w .()+-]{0,118}", re.ASCII)
-BOARD = re.compile(r"(charuco|charuco-old|chess):\d{1,2}x\d{1,2}:[\d.]{1,8}(:[\d.]{1,8})?")
-SETS = ("lens", "floor", "colours")
 
 
 def _folder(folders: Folders, which: object) -> Path:

@@ -10,12 +10,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from starlette.requests import Request
-from starlette.responses import Response
-
 from hil.config.load import builtin_names
 from hil.console.orders import inside
-from hil.console.records import answer_json
 from hil.core.errors import BadInput
 from hil.core.files import read_toml, replace_file
 from hil.core.registries import OUTER_LAWS
@@ -25,7 +21,6 @@ from hil.runs.orders import BOARD, LAW
 if TYPE_CHECKING:
     from hil.console.folders import Folders
     from hil.console.orders import Order
-    from hil.console.server import Console
 
 TUNED = "robot-tuned.toml"
 _CHANGES = 500
@@ -157,20 +152,3 @@ def _robot_in(name: str, kind: str) -> str:
     if found:
         return str(below)
     return _robot_in(str(below), "scenarios" if below in builtin_names("scenarios") else "labs")
-
-
-async def _write(_request: Request, console: Console) -> Response:
-    """Write what was changed in the run that is on, or was."""
-    live = console.live
-    if live.order is None or not live.tuning.moved():
-        raise BadInput("tuning: nothing was changed, so that there is nothing to write")
-    place = write_tuned(
-        console.folders, live.order, live.begun["law"],
-        live.begun["scenario"]["control"]["gain_set"], live.tuning.moved(),
-    )  # fmt: skip
-    return answer_json(
-        {"file": console.folders.name_of(place), "text": place.read_text(encoding="utf-8")}
-    )
-
-
-CHANGED = {"/api/write-tuned": _write}

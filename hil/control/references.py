@@ -23,7 +23,10 @@ from hil.core.types import ReferenceState
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
+    from hil.config.scenario import Scenario
+
 _ZERO = (0.0, 0.0)
+_SAMPLES = 200  # instants at which a reference's speed is looked at
 
 
 class Reference(Protocol):
@@ -274,3 +277,25 @@ def unfinished(config: ReferenceConfig, duration_s: float) -> str | None:
         f"the run ends after {duration_s:g} s with {100 * way:.2g} % of it done, and its figures "
         "judge no more than that; give duration_s more, or the path a wider turn"
     )
+
+
+def notes(scenario: Scenario) -> list[str]:
+    """Return what a reader must know before trusting a run's figures: one line each.
+
+    What the reference asks may lie beyond the run's duration or the loop's limits; the run is then
+    possible, and its figures say something else than they seem to.
+    """
+    reference = make_reference(scenario.reference)
+    limits, run_s = scenario.control.limits, scenario.duration_s
+    found = []
+    if told := unfinished(scenario.reference, run_s):
+        found.append(told)
+    rates = [reference.at(run_s * k / _SAMPLES).z1_dot_m_s for k in range(_SAMPLES + 1)]
+    fastest = max(math.hypot(*rate) for rate in rates)
+    most = math.hypot(limits.eta1_max_m_s, scenario.robot.d0_m * limits.theta_dot_max_rad_s)
+    if fastest > most:
+        found.append(
+            f"the reference moves at up to {fastest:.3g} m/s, more than the {most:.3g} m/s that "
+            "control.limits allow: it cannot be followed"
+        )
+    return found

@@ -118,6 +118,11 @@ METRICS = (
     Metric("duration_s", "s", "duration", "last tick - first tick", "neither"),
 )  # fmt: skip
 BY_NAME = {metric.name: metric for metric in METRICS}
+# What stands beside the figures of a run in the tables of campaigns and of `compare --csv`.
+BESIDE = frozenset({
+    "record", "scenario_name", "target", "camera", "outer", "inner", "seed", "outcome", "basis",
+    "index", "draw", "detail", "holds", "t_end_s", "program",
+})  # fmt: skip
 
 
 def figure(
@@ -130,6 +135,10 @@ def figure(
     Raises BadInput for a name that cannot be a column, an empty meaning, or a name that is taken.
     """
     _require_words("figure", name, unit=unit, meaning=meaning, label=label)
+    if name in BESIDE:
+        raise BadInput(
+            f"figure {name!r}: tables have a column {name} beside the figures of a run; name it otherwise"
+        )
     if smaller_is_better not in (True, False, None):
         raise BadInput(
             f"figure {name}: smaller_is_better = {smaller_is_better!r}: True, False, or None for neither"

@@ -21,10 +21,11 @@ from hil.analysis.pieces import PIECE_ROWS
 from hil.core.errors import BadInput
 from hil.core.files import replacing
 from hil.record.schema import Column
-from hil.record.writing import GuardedFile, Keeping
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from hil.record.writing import GuardedFile
 
 Columns = Mapping[str, "NDArray[np.float64]"]
 # Rows of a Parquet row group. A table that fits one is held in memory whole; of a longer one there is
@@ -37,26 +38,17 @@ _MAX_HEADER = 65_536
 
 
 class Journal:
-    """Writer of one table; `write` only packs and buffers, `flush` hands rows to the system."""
+    """Writer of one table to a new file; `write` only packs and buffers."""
 
-    def __init__(self, path: Path, names: Sequence[str], keeping: Keeping) -> None:
-        self.path = path
-        self._file = GuardedFile(path, keeping)
+    def __init__(self, file: GuardedFile, names: Sequence[str]) -> None:
+        self._write = file.write
         self._pack = struct.Struct(f"<{len(names)}d").pack
-        self._file.write(json.dumps({"format": _FORMAT, "columns": list(names)}).encode() + b"\n")
-        self._file.flush()
+        file.write(json.dumps({"format": _FORMAT, "columns": list(names)}).encode() + b"\n")
+        file.flush()
 
     def write(self, row: Sequence[float]) -> None:
         """Append one row, values in column order; NaN stands for "does not exist"."""
-        self._file.write(self._pack(*row))
-
-    def flush(self) -> None:
-        """Make the rows so far survive the death of this process."""
-        self._file.flush()
-
-    def close(self) -> None:
-        """Flush and close; safe to call twice."""
-        self._file.close()
+        self._write(self._pack(*row))
 
 
 def read_journal(path: Path) -> dict[str, NDArray[np.float64]]:

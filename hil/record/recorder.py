@@ -9,24 +9,24 @@ import shutil
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hil.analysis import metrics
-from hil.analysis.pieces import row_count
 from hil.core.errors import RecordFault
-from hil.core.files import PART, replace_file
 from hil.record import layout
+from hil.record.beside import ViewerFile
 from hil.record.camera import CameraKeeper
-from hil.record.journal import Columns, Journal, journal_to_parquet
-from hil.record.manifest import Manifest, Outcome, file_entry, keep_texts, write_manifest
-from hil.record.reader import RunRecord, read_events, read_pictures
-from hil.record.schema import FRAME_COLUMNS, FRAME_NAMES, Column
+from hil.record.closing import finish, give_up
+from hil.record.journal import Journal
+from hil.record.manifest import Manifest, Outcome, keep_texts, write_manifest
+from hil.record.schema import FRAME_NAMES
 from hil.record.tape import TapeWriter
-from hil.record.tlog import TlogWriter
-from hil.record.writing import GuardedFile, Keeping
+from hil.record.tlog import log_entry
+from hil.record.writing import Keeping
 
 if TYPE_CHECKING:
     from hil.core.rig import Picture
+    from hil.record.reader import RunRecord
 
 _FLUSH_PERIOD_S = 1.0
 _PICTURE_PERIOD_S = 0.5
@@ -51,31 +51,35 @@ class Recorder:
         small_video: bool = False,
         frame_rate_hz: float = 30.0,
         rerun: bool = True,
+        viewer: ViewerFile | None = None,
     ) -> None:
         self.path = out_dir
         self._manifest = manifest
-        self._rerun = rerun
+        self._viewer = (viewer or ViewerFile()) if rerun else None
         self._keeping = keeping = Keeping.of_new_folder(out_dir)
         try:
             keep_texts(out_dir, manifest.plugins)
-            self._samples = Journal(
-                out_dir / layout.SAMPLES_JOURNAL, manifest.sample_names, keeping
-            )
-            self._frames = Journal(out_dir / layout.FRAMES_JOURNAL, FRAME_NAMES, keeping)
-            self._tlog = TlogWriter(out_dir / layout.LINK, manifest.start_unix_us, keeping)
-            self.tape = TapeWriter(out_dir / layout.TAPE, keeping)
-            self._events = GuardedFile(out_dir / layout.EVENTS, keeping)
             write_manifest(out_dir, manifest)
+            self._samples, self._frames = (
+                Journal(keeping.open(name), columns)
+                for name, columns in (
+                    (layout.SAMPLES_JOURNAL, manifest.sample_names),
+                    (layout.FRAMES_JOURNAL, FRAME_NAMES),
+                )
+            )
+            self._link = keeping.open(layout.LINK)
+            self._events = keeping.open(layout.EVENTS)
+            self.tape = TapeWriter(keeping.open(layout.TAPE))
         except OSError as error:
             raise keeping.fail(error) from None
         self._camera: CameraKeeper | None = None
         kept = layout.CAMERA_SMALL if small_video else layout.CAMERA
         self._video = out_dir / kept if record_camera or small_video else None
         self._frame_rate_hz = frame_rate_hz
+        self._start_unix_us = manifest.start_unix_us
         self._next_flush_s = -math.inf
         self._rows = 0
-        self._write_row = self._samples.write
-        self.link_frame = self._tlog.write
+        self._write_row, self._write_link = self._samples.write, self._link.write
 
     def _put_manifest(self) -> None:
         if self._keeping.fault is not None:
@@ -87,9 +91,13 @@ class Recorder:
 
     def start(self, unix_us: int) -> None:
         """Take the wall time of t_s = 0, which dates every frame of link.tlog."""
-        self._tlog.start_unix_us = unix_us
+        self._start_unix_us = unix_us
         self._manifest = self._manifest.model_copy(update={"start_unix_us": unix_us})
         self._put_manifest()
+
+    def link_frame(self, t_s: float, frame: bytes) -> None:
+        """Append one whole MAVLink frame, sent or received at `t_s`."""
+        self._write_link(log_entry(self._start_unix_us + round(t_s * 1e6), frame))
 
     def append(self, row: Sequence[float]) -> None:
         """Append one outer tick, values in the order of the manifest's sample_names, NaN for unknown."""
@@ -138,11 +146,7 @@ class Recorder:
     def flush(self) -> None:
         """Hand everything so far to the system."""
         self._keeping.check(self.path / layout.MANIFEST)
-        self._samples.flush()
-        self._frames.flush()
-        self._tlog.flush()
-        self.tape.flush()
-        self._events.flush()
+        self._keeping.flush()
 
     def close(
         self, outcome: Outcome, detail: str = "", link: metrics.LinkStats | None = None
@@ -152,11 +156,12 @@ class Recorder:
         Where that cannot be done, what is there is left readable, the outcome becomes a fault, and
         RecordFault is raised; so it is when something could not be written before.
         """
+        ended = self._ended(outcome, detail, link or metrics.LinkStats())
         try:
             self._keeping.check(self.path / layout.MANIFEST)
             self._stop_writers()
             if self._keeping.fault is None:
-                return self._finish(outcome, detail, link)
+                return finish(self._keeping, ended, self._viewer)
         except OSError as error:
             self._keeping.fail(error)
         except RecordFault:
@@ -165,15 +170,18 @@ class Recorder:
             with suppress(RecordFault):  # what is not found any more shows in many ways
                 self._keeping.check(self.path / layout.MANIFEST)
             if self._keeping.fault is None:
-                self._give_up(f"the record could not be finished: {error}")
+                self._give_up("fault", f"the record could not be finished: {error}")
                 raise
+        except KeyboardInterrupt as stop:  # by a figure of one's own: signals wait for the end
+            self._give_up("interrupted", str(stop) or "Ctrl-C")
+            raise
         assert self._keeping.fault is not None
         before = (
             f"{detail}; "
             if outcome != "complete" and detail not in str(self._keeping.fault)
             else ""
         )
-        self._give_up(f"{before}{self._keeping.fault}")
+        self._give_up("fault", f"{before}{self._keeping.fault}")
         raise self._keeping.fault
 
     def discard(self) -> None:
@@ -182,69 +190,25 @@ class Recorder:
             self._stop_writers()
         shutil.rmtree(self.path, ignore_errors=True)
 
-    def _give_up(self, detail: str) -> None:
-        """Leave what was written as it is, and say in the manifest how it ended, where that goes."""
-        with suppress(OSError, RecordFault):
-            self._stop_writers()
-        with suppress(OSError):
-            for part in self.path.rglob(f"*{PART}"):
-                part.unlink()
-        self._keeping.release()
-        ended = {"outcome": "fault", "outcome_detail": detail, "tick_count": self._rows}
-        with suppress(OSError):
-            write_manifest(self.path, self._manifest.model_copy(update=ended), durable=True)
-
-    def _finish(self, outcome: Outcome, detail: str, link: metrics.LinkStats | None) -> RunRecord:
-        columns = self._manifest.sample_columns
-        samples = self._finish_table(layout.SAMPLES_JOURNAL, layout.SAMPLES, columns)
-        frames = self._finish_table(layout.FRAMES_JOURNAL, layout.FRAMES, FRAME_COLUMNS)
-        stats = link or metrics.LinkStats()
-        ended = {
+    def _ended(
+        self, outcome: Outcome, detail: str, link: metrics.LinkStats | None = None
+    ) -> Manifest:
+        """Return the manifest with how the run ended."""
+        ended: dict[str, Any] = {
             "outcome": outcome,
             "outcome_detail": detail,
-            "tick_count": row_count(samples),
-            "link": {key: float(value) for key, value in dataclasses.asdict(stats).items()},
+            "tick_count": self._rows,
         }
-        run = RunRecord(
-            path=self.path,
-            manifest=self._manifest.model_copy(update=ended),
-            samples=samples,
-            frames=frames,
-            events=read_events(self.path / layout.EVENTS),
-            pictures=read_pictures(self.path / layout.PICTURES),
-        ).with_own_figures()
-        self._write_figures(run)
-        if self._rerun:
-            from hil.record.rrd import write_rrd  # noqa: PLC0415 - half a second, only when used
-
-            write_rrd(self.path / layout.RERUN, [run])
-        return self._seal(run)
+        if link is not None:
+            ended["link"] = {key: float(value) for key, value in dataclasses.asdict(link).items()}
+        return self._manifest.model_copy(update=ended)
 
     def _stop_writers(self) -> None:
-        for writer in (self._samples, self._frames, self._tlog, self.tape, self._events):
-            writer.close()
+        self._keeping.close()
         if self._camera is not None:
             self._camera.close()
 
-    def _finish_table(self, journal: str, parquet: str, schema: Sequence[Column]) -> Columns:
-        columns = journal_to_parquet(self.path / journal, self.path / parquet, schema)
-        (self.path / journal).unlink()
-        return columns
-
-    def _write_figures(self, run: RunRecord) -> None:
-        figures = run.figures()
-        verdicts = metrics.check(figures, run.manifest.scenario)
-        tree = figures.to_json() | {"requirements": [verdict.to_json() for verdict in verdicts]}
-        replace_file(self.path / layout.FIGURES, json.dumps(tree, indent=1).encode() + b"\n")
-
-    def _seal(self, run: RunRecord) -> RunRecord:
-        """Write the final manifest with size and SHA-256 of every file."""
-        self._keeping.release()
-        files = {
-            file.relative_to(self.path).as_posix(): file_entry(file)
-            for file in sorted(self.path.rglob("*"))
-            if file.is_file() and file.name != layout.MANIFEST
-        }
-        manifest = run.manifest.model_copy(update={"files": files})
-        write_manifest(self.path, manifest, durable=True)
-        return dataclasses.replace(run, manifest=manifest)
+    def _give_up(self, outcome: Outcome, detail: str) -> None:
+        with suppress(OSError, RecordFault):
+            self._stop_writers()
+        give_up(self._keeping, self._ended(outcome, detail))

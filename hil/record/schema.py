@@ -9,12 +9,7 @@ null in the file.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
-
-from hil.core.errors import BadInput
-
-if TYPE_CHECKING:
-    from hil.core.registry import Entry
+from typing import Literal
 
 SCHEMA_VERSION = 1
 
@@ -126,18 +121,3 @@ ADDED_LATER = ("pose_accepted",)
 SAMPLE_NAMES = tuple(column.name for column in SAMPLE_COLUMNS)
 FRAME_NAMES = tuple(column.name for column in FRAME_COLUMNS)
 TRACE_KEYS = tuple(column.trace_key for column in LAW_COLUMNS)
-
-
-def own_columns(law: Entry) -> tuple[Column, ...]:
-    """Return the columns that a law adds with `trace=`; raises BadInput for a name that is taken."""
-    taken = {*SAMPLE_NAMES, *TRACE_KEYS}
-    for name in law.trace:
-        if name in taken:
-            raise BadInput(
-                f"law {law.name} ({law.origin}): trace name {name!r} is that of a column that every "
-                "record has; name it otherwise"
-            )
-    return tuple(
-        Column(name, unit, "law", meaning, trace_key=name)
-        for name, (unit, meaning) in law.trace.items()
-    )

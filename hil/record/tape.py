@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any
 
 from hil.core.errors import BadInput, RigFault
 from hil.core.rig import PORT_BYTES, PortStream, discard_unsent
-from hil.record.writing import GuardedFile, Keeping
 
 if TYPE_CHECKING:
     from hil.core.rig import ByteStream, Frame, Rig, Truth
+    from hil.record.writing import GuardedFile
 
 _HEADER = json.dumps({"format": "hil-tape-1"}).encode() + b"\n"
 _CLOCK = struct.Struct("<cd")
@@ -40,20 +40,11 @@ Entry = tuple[bytes, float | bytes]
 
 
 class TapeWriter:
-    """Appends entries; `write` takes them packed."""
+    """Appends entries to a new file; `write` takes them packed."""
 
-    def __init__(self, path: Path, keeping: Keeping) -> None:
-        self._file = GuardedFile(path, keeping)
-        self.write: Callable[[bytes], int] = self._file.write
+    def __init__(self, file: GuardedFile) -> None:
+        self.write: Callable[[bytes], int] = file.write
         self.write(_HEADER)
-
-    def flush(self) -> None:
-        """Make the entries so far survive the death of this process."""
-        self._file.flush()
-
-    def close(self) -> None:
-        """Flush and close; safe to call twice."""
-        self._file.close()
 
     def order(self, order: Mapping[str, Any]) -> None:
         """Note what an operator ordered, where the session took it."""

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 from hil.core.errors import BadInput
 from hil.core.files import LOG_BYTES, read_bounded
-from hil.record.writing import GuardedFile, Keeping
 
 _STAMP = struct.Struct(">Q")
 _MAGIC_2 = 0xFD
@@ -29,25 +28,9 @@ class LoggedFrame(NamedTuple):
     frame: bytes
 
 
-class TlogWriter:
-    """Writes whole MAVLink frames of both directions in the order in which they are given."""
-
-    def __init__(self, path: Path, start_unix_us: int, keeping: Keeping) -> None:
-        self._file = GuardedFile(path, keeping)
-        self.start_unix_us = start_unix_us
-
-    def write(self, t_s: float, frame: bytes) -> None:
-        """Append one frame sent or received at `t_s` after the start."""
-        stamp = self.start_unix_us + round(t_s * 1e6)
-        self._file.write(_STAMP.pack(stamp) + frame)
-
-    def flush(self) -> None:
-        """Make the frames so far survive the death of this process."""
-        self._file.flush()
-
-    def close(self) -> None:
-        """Flush and close; safe to call twice."""
-        self._file.close()
+def log_entry(unix_us: int, frame: bytes) -> bytes:
+    """Return what a log has of one whole MAVLink frame, sent or received at that wall time."""
+    return _STAMP.pack(unix_us) + frame
 
 
 def read_tlog(path: Path) -> Iterator[LoggedFrame]:

@@ -22,11 +22,12 @@ _RESERVE = ".reserve"
 
 
 class Keeping:
-    """Whether a record can still be written, and the space kept back for its end."""
+    """The files of a record that are open, whether they can still be written, and space kept for the end."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
+        self.folder = folder
         self._reserve = folder / _RESERVE
+        self._files: list[GuardedFile] = []
         self.fault: RecordFault | None = None
 
     @classmethod
@@ -43,13 +44,29 @@ class Keeping:
             raise keeping.fail(error) from None
         return keeping
 
+    def open(self, name: str) -> GuardedFile:
+        """Open a new file of the record; raises OSError."""
+        file = GuardedFile(self.folder / name, self)
+        self._files.append(file)
+        return file
+
+    def flush(self) -> None:
+        """Hand everything so far to the system, so that it survives the death of this process."""
+        for file in self._files:
+            file.flush()
+
+    def close(self) -> None:
+        """Flush and close every file; raises RecordFault once. Safe to call twice."""
+        for file in self._files:
+            file.close()
+
     def fail(self, error: OSError, path: Path | None = None) -> RecordFault:
         """Note the first error, and return what is to be raised for it."""
         if self.fault is None:
             what = error.strerror or " ".join(str(error).split())
             where = f" ({path.name})" if path is not None else ""
             self.fault = RecordFault(
-                f"record {self._folder}: cannot be written any more: {what}{where}; "
+                f"record {self.folder}: cannot be written any more: {what}{where}; "
                 "what was written before is kept"
             )
         return self.fault
@@ -60,7 +77,7 @@ class Keeping:
             file = self._reserve.open("xb")
         except FileExistsError:
             raise BadInput(
-                f"--out {self._folder}: another process writes there; name a new one"
+                f"--out {self.folder}: another process writes there; name a new one"
             ) from None
         with file:
             try:

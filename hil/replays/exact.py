@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from hil.config.fit import board_parameters
 from hil.config.load import with_overrides
 from hil.config.scenario import Scenario
+from hil.control.laws.making import law_and_gains
 from hil.core.errors import BadInput, RigFault
 from hil.core.registries import OUTER_LAWS
 from hil.core.types import Estimate, OuterCommand, OuterLaw, ReferenceState
@@ -26,9 +27,9 @@ from hil.record.source import Source, load_plugins, read_source, recorded_scenar
 from hil.record.tlog import LoggedFrame
 from hil.replays.divergence import Channel, compare_columns, compare_link
 from hil.rigs.replay import HAPPENED, open_replay
-from hil.runs.assembly import make_ordered_parts
-from hil.runs.orders import OrderSource
-from hil.runs.parts import Ending
+from hil.runs.assembly import make_parts
+from hil.runs.orders import OrderSource, ordered
+from hil.runs.parts import Ending, closed
 from hil.runs.provenance import trace_terms
 from hil.runs.session import Session
 from hil.runs.spec import RunSpec
@@ -130,7 +131,9 @@ def replay(
     rig = open_replay(source, recorded)
     # A shadow shows what the gains it was given would command: those ordered in the record are not its own.
     orders = OrderSource(rig.take_orders, rig.was_held)
-    parts = make_ordered_parts(spec, rig, recorder, orders, keep_gains=kind == "shadow")
+    law_run, live = law_and_gains(law, scenario, live=kind == "exact")
+    parts = make_parts(spec, rig, recorder, law_run)
+    parts = ordered(parts, orders, scenario.safety, live)
     shadow = Shadow(parts.law, source.samples) if kind == "shadow" else None
     parts = replace(parts, law=shadow or parts.law)
     # The board's parameters are in the record whatever is changed here.
@@ -139,7 +142,7 @@ def replay(
         ending = Session(scenario, parts, parameters, board_hashes, progress).run()
     except RigFault as fault:  # the record ended after the session's own handling of faults
         ending = Ending("fault", str(fault))
-    record = recorder.close(ending.outcome, ending.detail)
+    record = closed(recorder, ending, None)
     samples = record.samples
     if not samples["t_s"].size:
         _refuse_without_ticks(source)

@@ -78,6 +78,11 @@ class SerialStream:
         with contextlib.suppress(serial.SerialException, OSError, termios_error):
             self.port.reset_output_buffer()
 
+    def discard_received(self) -> None:
+        """Forget what has arrived and was not read."""
+        with contextlib.suppress(serial.SerialException, OSError, termios_error):
+            self.port.reset_input_buffer()
+
     def close(self) -> None:
         """Release the port; safe to call twice."""
         self.port.close()
@@ -117,6 +122,11 @@ class SerialRig:
         self._port = SerialStream(device, baud)
         self.stream: ByteStream = self._port
         self._camera = camera
+
+    def watch_by(self, camera: FrameSource) -> None:
+        """Take the camera; what the board said while it was opened is dropped, for it is not of now."""
+        self._camera = camera
+        self._port.discard_received()
 
     def now_s(self) -> float:
         """Return the monotonic clock of this machine."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from hil.config.limits import wheel_speed_max_rad_s
@@ -17,8 +16,6 @@ from hil.control.vehicles.vehicle import make_vehicle
 from hil.core.clocks import CameraClock
 from hil.core.registries import OUTER_LAWS
 from hil.record.timeline import Timeline
-from hil.runs.law_guard import at_rest, bare_law
-from hil.runs.orders import OperatorOrders, RetunedLaw, SteppedReference
 from hil.runs.parts import Parts
 from hil.wire.link import BoardLink
 from vision.localisers.making import localiser_of_frames
@@ -29,12 +26,11 @@ if TYPE_CHECKING:
     from hil.core.rig import Rig
     from hil.core.types import OuterLaw
     from hil.record.memory import RunSink
-    from hil.runs.orders import OrderSource
     from hil.runs.spec import RunSpec
 
 
 def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw) -> Parts:
-    """Return the parts of a session over `rig` with its outer law; raises BadInput."""
+    """Return the parts of a session over `rig`, its law under what holds for every law; raises BadInput."""
     scenario, control = spec.scenario, spec.scenario.control
     vehicle = make_vehicle(scenario.robot)
     timeline = Timeline(recorder, _unix_us)
@@ -55,25 +51,11 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw) -> Par
     )
 
 
-def make_ordered_parts(
-    spec: RunSpec, rig: Rig, recorder: RunSink, source: OrderSource, *, keep_gains: bool = False
-) -> Parts:
-    """Return the parts of a session whose operator may order; with `keep_gains`, not of the law."""
-    entry, control = OUTER_LAWS.get(spec.outer), spec.scenario.control
-    gains = control.active_gains.of(entry)
-    law = RetunedLaw(entry, gains, lambda now: bare_law(entry, now, spec.scenario))
-    parts = make_parts(spec, rig, recorder, at_rest(entry, law, control.limits))
-    goal = SteppedReference(parts.reference, spec.scenario.safety)
-    own = None if keep_gains else law
-    orders = OperatorOrders(source, parts.link, parts.timeline, goal, own)
-    return replace(parts, orders=orders, reference=goal)
-
-
 def limited(law: OuterLaw, vehicle: Vehicle, scenario: Scenario) -> OuterLaw:
     """Return the law in its axes, under what holds for every law."""
     limits = scenario.control.limits
     law = in_axes(law, scenario.control.axes_rad)
-    law = WithinWheelSpeed(law, vehicle, wheel_speed_max_rad_s(scenario))
+    law = WithinWheelSpeed(law, vehicle, wheel_speed_max_rad_s(scenario.board))
     law = TurnFirst(law, limits.turn_missing_rad_s)
     return LetGo(law, vehicle, limits.let_go_rad_s)
 

@@ -16,7 +16,7 @@ from hil.control.translated import native_law, native_reference
 from hil.record.memory import MemoryRecorder
 from hil.record.schema import TRACE_KEYS
 from hil.runs import _native
-from hil.runs.orders import NoOrders
+from hil.runs.parts import NoOrders
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,11 +26,16 @@ if TYPE_CHECKING:
 
 
 def make_drive(
-    parts: Parts, intake: Intake, watch: _native.Watch, t0_s: float, period_s: float, ticks: int
+    parts: Parts,
+    pump: _native.Pump,
+    watch: _native.Watch,
+    t0_s: float,
+    period_s: float,
+    ticks: int,
 ) -> _native.Drive | None:
     """Return what runs the ticks natively; None where a part has no native form."""
     geometry = parts.vehicle.geometry
-    if intake.pump is None or type(parts.orders) is not NoOrders:
+    if type(parts.orders) is not NoOrders:
         return None
     if type(geometry) is not BelievedGeometry:
         return None
@@ -41,7 +46,7 @@ def make_drive(
     known = (*_outer.TRACE_KEYS, *parts.own_terms)
     places = {key: place for place, key in enumerate(known)}
     return _native.Drive(
-        pump=intake.pump,
+        pump=pump,
         watch=watch,
         law=law,
         reference=reference,
@@ -57,6 +62,7 @@ def make_drive(
 def drive_to_end(
     drive: _native.Drive,
     parts: Parts,
+    pump: _native.Pump,
     intake: Intake,
     board: Callable[[], tuple[int, float, float]],
     check_safety: Callable[[float], None],
@@ -64,13 +70,12 @@ def drive_to_end(
     """Run all ticks; raises as `check_safety` (asked at the host's time) and everybody on the way do."""
     link, recorder = parts.link, parts.recorder
     assert isinstance(recorder, MemoryRecorder)  # else there is no pump
-    assert intake.pump is not None
     stop = -1
     try:
         while stop != _native.DONE:
             stop = drive.run(link.busy, bool(intake.refusal), board())
             if stop == _native.DRIVE_HEARD:
-                intake.hear(intake.pump)
+                intake.hear(pump)
             elif stop == _native.DRIVE_TAKEN:
                 intake.note_texts()
             elif stop == _native.ASKED:

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import cv2
 
-from hil.analysis.metrics import LinkStats
 from hil.config.fit import board_parameters, check_fit
+from hil.control.laws.making import law_and_gains, make_law
 from hil.core.registry import in_one_line
 from hil.record.memory import MemoryRecorder
 from hil.record.recorder import Recorder
 from hil.record.tape import TapedRig
 from hil.rigs.opening import open_rig
-from hil.runs.assembly import make_ordered_parts, make_parts
+from hil.runs.assembly import make_parts
 from hil.runs.interruption import CtrlC
-from hil.runs.law_guard import make_law
-from hil.runs.orders import with_orders
+from hil.runs.orders import ordered, with_orders
 from hil.runs.outside import fault_of
-from hil.runs.parts import Ending, Progress, Publish
+from hil.runs.parts import Ending, Progress, Publish, closed
 from hil.runs.provenance import Used, make_manifest, used_things
 from hil.runs.session import Session
 from hil.runs.spec import RunSpec, camera_for, exit_status, judged_status, new_folder
@@ -28,16 +27,34 @@ from hil.wire.identity import board_hashes
 if TYPE_CHECKING:
     from hil.core.rig import Rig
     from hil.core.types import OuterLaw
+    from hil.record.beside import ViewerFile
+    from hil.record.manifest import Manifest
     from hil.record.reader import RunRecord
     from hil.runs.orders import OrderSource
+    from hil.runs.parts import Parts
     from hil.runs.watched import Watch
-    from hil.wire.link import BoardLink
 
 # What most callers need beside it stands in hil.runs.spec.
 __all__ = [
-    "RunSpec", "camera_for", "execute", "execute_in_memory", "exit_status", "judged_status",
-    "link_stats", "new_folder",
+    "Checked", "RunSpec", "camera_for", "checked", "execute", "execute_in_memory", "exit_status",
+    "judged_status", "new_folder",
 ]  # fmt: skip
+
+
+class Checked(NamedTuple):
+    """What follows from a spec that can be run: the board's parameters, what takes part, what is recorded."""
+
+    parameters: dict[str, float]
+    used: Used
+    manifest: Manifest
+
+
+def checked(spec: RunSpec) -> Checked:
+    """Return what follows from a spec; raises BadInput where its values cannot work together."""
+    parameters = board_parameters(spec.scenario, spec.inner)
+    check_fit(spec.scenario)
+    used = used_things(spec)
+    return Checked(parameters, used, make_manifest(spec, parameters, used))
 
 
 def execute(
@@ -47,6 +64,7 @@ def execute(
     publish: Publish | None = None,
     watch: Watch | None = None,
     orders: OrderSource | None = None,
+    viewer: ViewerFile | None = None,
 ) -> RunRecord:
     """Run the spec and return its closed record; raises BadInput before anything is written.
 
@@ -56,14 +74,12 @@ def execute(
 
     `rig` is another one than the spec's target names; it is closed here. `publish` is given the
     estimate of every tick, `watch` everything that the record is given, after it; `orders` are an operator's.
+    `viewer` writes the viewer's file, beside the run where it has been entered.
     """
     cv2.setNumThreads(1)  # search windows are small: handing them to threads costs more
-    check_fit(spec.scenario)
-    parameters = board_parameters(spec.scenario, spec.inner)
-    law = make_law(spec.outer, spec.scenario)
+    parameters, used, manifest = checked(spec)
+    law, live = law_and_gains(spec.outer, spec.scenario, live=orders is not None)
     rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
-    used = used_things(spec)
-    manifest = make_manifest(spec, parameters, used)
     ctrl_c = CtrlC()
     try:
         with ctrl_c:
@@ -74,45 +90,51 @@ def execute(
                 small_video=spec.small_video,
                 frame_rate_hz=spec.scenario.camera.rate_hz,
                 rerun=spec.rerun,
+                viewer=viewer,
             )
+            taped = TapedRig(rig, recorder.tape, ctrl_c.obey)
             sink = recorder if watch is None else WatchedSink(recorder, watch)
+            parts: Parts | None = None
+            error: Exception | SystemExit | None = None
             try:
-                taped = TapedRig(rig, recorder.tape, ctrl_c.obey)
-                if orders is None:
-                    parts = make_parts(spec, taped, sink, law)
-                else:
+                parts = make_parts(spec, taped, sink, law)
+                if orders is not None:
                     noted = with_orders(orders, recorder.tape.order)
-                    parts = make_ordered_parts(spec, taped, sink, noted)
+                    parts = ordered(parts, noted, spec.scenario.safety, live)
                 if watch is not None:
                     watch.began(parts)
                 session = Session(
                     spec.scenario, parts, parameters, board_hashes, progress, publish
                 )  # fmt: skip
-            except Exception as error:
-                ctrl_c.close()
-                recorder.close("fault", in_one_line(error))
-                raise fault_of(error, used) or error from None
-            ending = _conduct(session, ctrl_c, used)
-            record = recorder.close(ending.outcome, ending.detail, link_stats(parts.link))
-        if session.error is not None and fault_of(session.error, used) is None:
-            raise session.error
+                ending, error = _conducted(session, used)
+            except KeyboardInterrupt as stop:  # pressed again, while the robot was being stopped
+                ending = Ending("interrupted", str(stop) or "Ctrl-C")
+            except Exception as failed:
+                ending, error = (
+                    Ending("fault", in_one_line(failed)),
+                    fault_of(failed, used) or failed,
+                )
+            ctrl_c.close()  # from now on signals wait for the record
+            record = closed(recorder, ending, parts.link if parts is not None else None)
+        if error is not None:
+            raise error from None
         ctrl_c.obey()  # pressed after the last wait: this run is whole, whatever follows is not begun
         return record
     finally:
         rig.close()
 
 
-def _conduct(session: Session, ctrl_c: CtrlC, used: Used) -> Ending:
-    """Run the session to its end, whatever that is; from then on signals wait for the record."""
+def _conducted(session: Session, used: Used) -> tuple[Ending, Exception | SystemExit | None]:
+    """Run the session to its end; return that, and an error of the harness itself that ended it."""
     try:
         ending = session.run()
-    except KeyboardInterrupt as again:  # while the robot was being stopped
-        ctrl_c.close()
+    except KeyboardInterrupt:
         session.halt()
-        return Ending("interrupted", str(again))
-    ctrl_c.close()
-    fault = fault_of(session.error, used) if session.error is not None else None
-    return Ending("fault", str(fault)) if fault is not None else ending
+        raise
+    if session.error is None:
+        return ending, None
+    fault = fault_of(session.error, used)
+    return (Ending("fault", str(fault)), None) if fault is not None else (ending, session.error)
 
 
 def execute_in_memory(
@@ -123,29 +145,16 @@ def execute_in_memory(
     `rig` is another one than the spec's target names; it is closed here. `law` is another one than a
     new one of the spec.
     """
-    check_fit(spec.scenario)
-    parameters = board_parameters(spec.scenario, spec.inner)
+    parameters, used, manifest = checked(spec)
     law = law or make_law(spec.outer, spec.scenario)
     rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
-    used = used_things(spec)
     try:
-        recorder = MemoryRecorder(make_manifest(spec, parameters, used))
+        recorder = MemoryRecorder(manifest)
         parts = make_parts(spec, rig, recorder, law)
         session = Session(spec.scenario, parts, parameters, board_hashes)
         ending = session.run()
         if session.error is not None:
             raise fault_of(session.error, used) or session.error
-        return recorder.close(ending.outcome, ending.detail, link_stats(parts.link))
+        return closed(recorder, ending, parts.link)
     finally:
         rig.close()
-
-
-def link_stats(link: BoardLink) -> LinkStats:
-    """Return the counters of the host's end of the link."""
-    counters = link.counters
-    return LinkStats(
-        frames_sent=link.frames_sent,
-        frames_received=counters.frames,
-        frames_lost=counters.lost,
-        bytes_rejected=counters.skipped_bytes,
-    )

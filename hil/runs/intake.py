@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from hil.core.types import PoseMeasurement
 from hil.record.memory import MemoryRecorder
 from hil.runs import _native
-from hil.runs.watching import make_pump, picture_of
+from hil.runs.watching import picture_of
 from hil.wire.refusal import refused_set_point
 from vision.rolling import unrolled
 
@@ -22,17 +22,22 @@ if TYPE_CHECKING:
 class Intake:
     """Takes what arrives until a time; `refusal` is why the board refused a set-point, "" mostly.
 
-    `pump` does it in native code where nobody needs Python objects of it (native/pump.hpp).
+    A `pump` does it in native code where nobody needs Python objects of it (native/pump.hpp).
     """
 
     def __init__(
-        self, camera: CameraConfig, parts: Parts, watch: _native.Watch, note: Note
+        self,
+        camera: CameraConfig,
+        parts: Parts,
+        watch: _native.Watch,
+        note: Note,
+        pump: _native.Pump | None,
     ) -> None:
         self._camera = camera
         self._parts = parts
         self._watch = watch
         self._note = note
-        self.pump = make_pump(parts, watch, note)
+        self._pump = pump
         self.refusal = ""
         self._texts_noted = 0
         self._camera_restarts = 0
@@ -42,8 +47,8 @@ class Intake:
 
         Ctrl-C is obeyed in waits (`hil.runs.interruption`): a host that is always late must come to one too.
         """
-        if self.pump is not None:
-            self._native_until(self.pump, until_s)
+        if self._pump is not None:
+            self._native_until(self._pump, until_s)
             return
         rig = self._parts.rig
         waited = False
@@ -145,7 +150,7 @@ class Intake:
     def hand_over_frames(self) -> None:
         """Record the frames that native code has taken."""
         origin_s = self._parts.timeline.origin_s
-        if self.pump is not None and origin_s is not None:
+        if self._pump is not None and origin_s is not None:
             recorder = self._parts.recorder
             assert isinstance(recorder, MemoryRecorder)  # else there is no pump
-            recorder.frames.take(self.pump.frame_rows(origin_s))
+            recorder.frames.take(self._pump.frame_rows(origin_s))

@@ -14,7 +14,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
@@ -29,11 +29,13 @@ from hil.wire import handshake
 
 if TYPE_CHECKING:
     from hil.config.scenario import SafetyConfig
+    from hil.control.laws.retuned import RetunedLaw
     from hil.control.references import Reference
     from hil.core.registry import Entry
-    from hil.core.types import Estimate, OuterCommand, OuterLaw, ReferenceState, Vec2
+    from hil.core.types import Estimate, ReferenceState, Vec2
     from hil.record.timeline import Timeline
-    from hil.runs.execute import RunSpec
+    from hil.runs.parts import Parts
+    from hil.runs.spec import RunSpec
     from hil.wire.link import BoardLink, Procedure
 
 Order = Mapping[str, Any]
@@ -122,44 +124,6 @@ def step_of(x_m: float, y_m: float) -> Order:
     return {"step": [float(x_m), float(y_m)]}
 
 
-class RetunedLaw:
-    """An outer law whose gains may be others from a tick on.
-
-    A law that has `retune(gains)` goes on with them from where it is. Any other is made anew and starts
-    there, as at the beginning of a run.
-    """
-
-    def __init__(self, entry: Entry, gains: Any, make: Callable[[Any], OuterLaw]) -> None:
-        self.entry = entry
-        self._gains = gains
-        self._make = make
-        self._law = make(gains)
-
-    def reset(self, reference: ReferenceState, estimate: Estimate) -> None:
-        """Start anew."""
-        self._law.reset(reference, estimate)
-
-    def step(self, reference: ReferenceState, estimate: Estimate, dt_s: float) -> OuterCommand:
-        """Return the law's command."""
-        return self._law.step(reference, estimate, dt_s)
-
-    def gain(self, name: str) -> float:
-        """Return a gain as it is now."""
-        return float(getattr(self._gains, name))
-
-    def change(
-        self, name: str, value: float, reference: ReferenceState, estimate: Estimate
-    ) -> None:
-        """Change one gain; raises ValidationError, AttributeError."""
-        self._gains = type(self._gains).model_validate(self._gains.model_dump() | {name: value})
-        retune = getattr(self._law, "retune", None)
-        if retune is not None:
-            retune(self._gains)
-            return
-        self._law = self._make(self._gains)
-        self._law.reset(reference, estimate)
-
-
 class SteppedReference:
     """A reference whose point can be moved by hand, within the fence less the robot's room."""
 
@@ -189,27 +153,6 @@ class SteppedReference:
         if not inside:
             raise BadInput(f"step to ({x:.3f}, {y:.3f}) m: not within {ROOM_M:g} m of the fence")
         self._shift = (self._shift[0] + x_m, self._shift[1] + y_m)
-
-
-class Orders(Protocol):
-    """What a session asks for orders."""
-
-    def hold(self) -> bool:
-        """Return whether the robot is to be kept at rest still, before it is armed."""
-
-    def at_tick(self, reference: ReferenceState, estimate: Estimate) -> None:
-        """Take what was ordered since the tick before."""
-
-
-class NoOrders:
-    """Nobody orders anything."""
-
-    def hold(self) -> bool:
-        """Return False."""
-        return False
-
-    def at_tick(self, reference: ReferenceState, estimate: Estimate) -> None:
-        """Do nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -330,3 +273,15 @@ def with_orders(source: OrderSource, taken: Callable[[Order], None]) -> OrderSou
         return orders
 
     return replace(source, take=take)
+
+
+def ordered(
+    parts: Parts, source: OrderSource, safety: SafetyConfig, law: RetunedLaw | None
+) -> Parts:
+    """Return the parts of a session whose operator may order: steps of the goal, values of board and law.
+
+    `law` is None where its gains are not to be touched.
+    """
+    goal = SteppedReference(parts.reference, safety)
+    orders = OperatorOrders(source, parts.link, parts.timeline, goal, law)
+    return replace(parts, orders=orders, reference=goal)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
-from hil.runs.orders import NoOrders, Orders
+from hil.analysis.metrics import LinkStats
+from hil.record.memory import RunSink
 
 if TYPE_CHECKING:
     from hil.control.references import Reference
@@ -14,7 +15,8 @@ if TYPE_CHECKING:
     from hil.core.clocks import CameraClock
     from hil.core.rig import Rig
     from hil.core.types import Estimate, Estimator, OuterLaw, ReferenceState
-    from hil.record.memory import RunSink
+    from hil.record.manifest import Outcome
+    from hil.record.reader import RunRecord
     from hil.record.timeline import Timeline
     from hil.wire.link import BoardLink
     from vision.looking import Looker
@@ -22,6 +24,27 @@ if TYPE_CHECKING:
 Progress = Callable[[float], None]
 # Takes host time, state of the robot, and whether it is armed, once a tick.
 Publish = Callable[[float, "Estimate", bool], None]
+
+
+class Orders(Protocol):
+    """What a session asks for orders."""
+
+    def hold(self) -> bool:
+        """Return whether the robot is to be kept at rest still, before it is armed."""
+
+    def at_tick(self, reference: ReferenceState, estimate: Estimate) -> None:
+        """Take what was ordered since the tick before."""
+
+
+class NoOrders:
+    """Nobody orders anything."""
+
+    def hold(self) -> bool:
+        """Return False."""
+        return False
+
+    def at_tick(self, reference: ReferenceState, estimate: Estimate) -> None:
+        """Do nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +71,29 @@ class Ending:
 
     outcome: Literal["complete", "fault", "interrupted"]
     detail: str = ""
+
+
+class OpenRecord(RunSink, Protocol):
+    """A record of one run, in a folder or in memory, until it is closed."""
+
+    def close(self, outcome: Outcome, detail: str = "", link: LinkStats | None = None) -> RunRecord:
+        """Finish it and return the run; raises RecordFault where it cannot be finished."""
+
+
+def closed(record: OpenRecord, ending: Ending, link: BoardLink | None) -> RunRecord:
+    """Close the record of a run that ended so; `link` counted its frames, None where there was none yet."""
+    stats = _stats(link) if link is not None else None
+    return record.close(ending.outcome, ending.detail, stats)
+
+
+def _stats(link: BoardLink) -> LinkStats:
+    counters = link.counters
+    return LinkStats(
+        frames_sent=link.frames_sent,
+        frames_received=counters.frames,
+        frames_lost=counters.lost,
+        bytes_rejected=counters.skipped_bytes,
+    )
 
 
 @dataclass(frozen=True, slots=True)

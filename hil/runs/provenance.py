@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.config.robot import BUILT_IN_PLANT
-from hil.control.task_notes import notes
+from hil.control.references import notes
+from hil.core.errors import BadInput
 from hil.core.figures import metric_of
 from hil.core.registries import ESTIMATORS, FIGURES, LOCALISERS, OUTER_LAWS, REFERENCES, VEHICLES
 from hil.core.registry import BUILT_IN, Entry, SourceText
@@ -21,7 +22,7 @@ from hil.record.manifest import (
     collect_versions,
     git_revision,
 )
-from hil.record.schema import own_columns
+from hil.record.schema import SAMPLE_NAMES, TRACE_KEYS
 from hil.rigs.opening import REPLAY
 
 if TYPE_CHECKING:
@@ -79,10 +80,17 @@ def make_manifest(spec: RunSpec, parameters: Mapping[str, float], used: Used) ->
 
 
 def trace_terms(law: Entry) -> list[TraceTerm]:
-    """Return the columns that a law brings along, for a manifest; raises BadInput."""
+    """Return the columns that a law adds with `trace=`, for a manifest; raises BadInput for a name taken."""
+    taken = {*SAMPLE_NAMES, *TRACE_KEYS}
+    for name in law.trace:
+        if name in taken:
+            raise BadInput(
+                f"law {law.name} ({law.origin}): trace name {name!r} is that of a column that every "
+                "record has; name it otherwise"
+            )
     return [
-        TraceTerm(name=column.name, unit=column.unit, meaning=column.meaning)
-        for column in own_columns(law)
+        TraceTerm(name=name, unit=unit, meaning=meaning)
+        for name, (unit, meaning) in law.trace.items()
     ]
 
 

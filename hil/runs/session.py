@@ -19,7 +19,7 @@ from hil.runs import _native
 from hil.runs.driving import drive_to_end, make_drive
 from hil.runs.intake import Intake
 from hil.runs.parts import Ending, Parts, Progress, Publish, Situation
-from hil.runs.watching import DIAGNOSIS, make_watch
+from hil.runs.watching import DIAGNOSIS, make_pump, make_watch
 from hil.wire import handshake
 
 if TYPE_CHECKING:
@@ -65,8 +65,8 @@ class Session:
 
         self._note = note  # no method: native parts keep it, and know nothing of this session
         self._watch = make_watch(scenario, parts, note)
-        self._intake = Intake(scenario.camera, parts, self._watch, note)
-        self._pump = self._intake.pump
+        self._pump = make_pump(parts, self._watch, note)
+        self._intake = Intake(scenario.camera, parts, self._watch, note, self._pump)
         self._format = _native.RowFormat(TRACE_KEYS, parts.own_terms)
         self.error: Exception | SystemExit | None = None  # what ended the run and is no rig fault
 
@@ -176,10 +176,12 @@ class Session:
         self._t0_s = rig.now_s()
         self._parts.timeline.start(self._t0_s)
         rig.begin(self._t0_s)
-        if not looked_at and (
-            drive := make_drive(self._parts, self._intake, self._watch, self._t0_s, period_s, ticks)
-        ):
-            drive_to_end(drive, self._parts, self._intake, self._board_counts, self._check_safety)
+        drive = None
+        if self._pump is not None and not looked_at:
+            drive = make_drive(self._parts, self._pump, self._watch, self._t0_s, period_s, ticks)
+        if self._pump is not None and drive is not None:
+            board, check = self._board_counts, self._check_safety
+            drive_to_end(drive, self._parts, self._pump, self._intake, board, check)
             return
         for tick in range(ticks):
             due_s = self._t0_s + tick * period_s

@@ -14,16 +14,15 @@ import gymnasium
 import numpy as np
 
 from hil.analysis.costs import COST_WEIGHTS, USUAL, Cost
-from hil.config.fit import board_parameters, check_fit
+from hil.config.fit import check_fit
 from hil.core.errors import BadInput, RigFault
 from hil.core.types import OuterCommand, wrap_pi
 from hil.record.memory import MemoryRecorder
 from hil.record.schema import SAMPLE_NAMES
 from hil.rigs.opening import is_simulated, open_rig, simulated_targets
 from hil.runs.assembly import make_parts
-from hil.runs.execute import RunSpec, link_stats
-from hil.runs.parts import Ending
-from hil.runs.provenance import make_manifest, used_things
+from hil.runs.execute import RunSpec, checked
+from hil.runs.parts import Ending, closed
 from hil.runs.session import Session
 from hil.wire.identity import board_hashes
 
@@ -181,11 +180,8 @@ class _Episode:
     def __init__(self, spec: RunSpec, cost: Cost) -> None:
         self.seed = spec.seed
         self._cost = cost
-        parameters = board_parameters(spec.scenario, spec.inner)
-        manifest = make_manifest(spec, parameters, used_things(spec)).model_copy(
-            update={"outer": OUTER, "plugins": []}
-        )
-        self._recorder = MemoryRecorder(manifest)
+        parameters, _, manifest = checked(spec)
+        self._recorder = MemoryRecorder(manifest.model_copy(update={"outer": OUTER, "plugins": []}))
         self._law = GivenCommand()
         self._rig: Rig = open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
         self._parts: Parts = make_parts(spec, self._rig, self._recorder, self._law)
@@ -235,7 +231,7 @@ class _Episode:
 
     def as_record(self, ending: Ending) -> RunRecord:
         """Return what was recorded so far."""
-        return self._recorder.close(ending.outcome, ending.detail, link_stats(self._parts.link))
+        return closed(self._recorder, ending, self._parts.link)
 
     def _cost_of_tick(self) -> float:
         """Return what the newest row adds to the cost: error over time, change of the command."""

@@ -21,7 +21,7 @@ from scipy import stats
 
 from hil.analysis.fronts import front_of
 from hil.analysis.intervals import Interval, mean_interval
-from hil.analysis.multiple import adjusted_p, cvar
+from hil.analysis.multiple import adjusted_p
 from hil.analysis.stats import Paired, paired
 from hil.core.registries import OUTER_LAWS
 from hil.study.suite import condition_of, task_of
@@ -236,15 +236,6 @@ def by_task(data: Data, law: str, level: float = MAIN_LEVEL) -> dict[str, float]
         for cell, value in (found or {}).items():
             logs.setdefault(task_of(cell), []).append(math.log(value))
     return {task: math.exp(_mean(values)) for task, values in logs.items()}
-
-
-def tail_of(data: Data, law: str, level: float = MAIN_LEVEL) -> float:
-    """Return the mean accuracy score of the worst 5 % of cells at a level of calm, over search seeds."""
-    values: list[float] = []
-    for seed in seeds_of(data):
-        found = at_calm(_front(data, law, seed), level, data["unseen_cells"])
-        values += list((found or {}).values())
-    return cvar(values)
 
 
 def other_rankings(data: Data, level: float = MAIN_LEVEL) -> list[str]:

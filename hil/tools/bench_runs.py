@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any, cast
 from hil.analysis.speed import Figure, Plan, measure
 from hil.config.link import UART_BAUD
 from hil.config.load import load_scenario
+from hil.control.laws.making import make_law
 from hil.core.registries import OUTER_LAWS
 from hil.rigs.opening import open_rig
 from hil.runs.execute import RunSpec, execute_in_memory
-from hil.runs.law_guard import make_law
 from sim_twin.setup import STEP_US, make_kernel
 
 if TYPE_CHECKING:

@@ -48,6 +48,8 @@ def write_template(
     text = _robot_text() if kind == "robot" else _text("templates", f"{kind}{suffix}")
     text = text.replace("my-thing", name).replace("my_thing", name.replace("-", "_"))
     text = text.replace("MyThing", "".join(part.capitalize() for part in re.split("[-_]", name)))
+    if suffix == ".toml":
+        text = f"#:schema {_schema(kind)}\n{text}"
     if robot is not None:
         text += f'\n[robot]\nfile = "{robot}"\n'
     try:
@@ -60,6 +62,11 @@ def write_template(
     except OSError as error:
         raise BadInput(f"{path}: cannot be written: {error.strerror}") from None
     return path, _TRY[kind].format(path.name, path.stem)
+
+
+def _schema(kind: str) -> str:
+    """Return the address of the installed schema by which an editor checks a file of this kind."""
+    return Path(str(files("hil") / "data" / "schemas" / f"{kind}.json")).resolve().as_uri()
 
 
 def _text(folder: str, name: str) -> str:

@@ -10,6 +10,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,8 +19,8 @@ import pytest
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput, HilError, RecordFault, RigFault, Stopped
 from hil.core.files import unwritable
-from hil.record import recorder
-from hil.record.manifest import write_manifest
+from hil.record import closing
+from hil.record.manifest import read_manifest, write_manifest
 from hil.record.reader import read_run
 from hil.record.recorder import Recorder
 from hil.replays.exact import replay
@@ -172,6 +173,11 @@ hil.estimator("mine")(Mine)
 """
 
 
+_MADE = """def __init__(self, settings, geometry):
+        self._inner = make_estimator("fused", settings, geometry)
+        self._seen = 0"""
+
+
 @pytest.mark.parametrize(
     "step", ["journal_to_parquet", "read_events", "read_pictures", "replace_file"]
 )
@@ -179,13 +185,13 @@ def test_a_folder_that_goes_away_while_the_record_is_closed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str
 ) -> None:
     """Whatever finds it gone, and whatever that raises, it is told as what it is."""
-    then = getattr(recorder, step)
+    then = getattr(closing, step)
 
     def gone(*arguments: object) -> object:
         shutil.rmtree(tmp_path / "run", ignore_errors=True)
         return then(*arguments)
 
-    monkeypatch.setattr(recorder, step, gone)
+    monkeypatch.setattr(closing, step, gone)
     with pytest.raises(RecordFault, match="cannot be written any more"):
         execute(replace(spec(tmp_path / "run"), rerun=True))
     assert not (tmp_path / "run").exists()
@@ -201,6 +207,31 @@ def test_an_estimator_of_ones_own_that_raises_is_named_with_its_line(tmp_path: P
     assert "by my own hand" in made.manifest.outcome_detail
     assert exit_status(made) == 3
     assert {"stopped", "stop"} & {event.kind for event in made.events}
+
+
+@pytest.mark.parametrize(
+    ("raised", "error", "outcome"),
+    [
+        ("ZeroDivisionError('by hand')", RigFault, "fault"),
+        ("KeyboardInterrupt", None, "interrupted"),
+    ],
+)
+def test_a_part_that_cannot_be_made_leaves_a_closed_record(
+    tmp_path: Path, raised: str, error: type[Exception] | None, outcome: str
+) -> None:
+    """The record is open by then: it says how it ended, and what came from outside is named."""
+    file = tmp_path / "mine.py"
+    made = (
+        f"def __init__(self, settings, geometry):\n        raise {raised}\n        self._seen = 0"
+    )
+    text = _ESTIMATOR.replace(_MADE, made)
+    assert text != _ESTIMATOR
+    file.write_text(text.replace('"mine"', f'"mine-{outcome}"'))
+    with pytest.raises(error) if error is not None else nullcontext():
+        execute(spec(tmp_path / "run", estimator=str(file)))
+    found = read_manifest(tmp_path / "run")
+    assert found.outcome == outcome
+    assert ("by hand" if error is not None else "Ctrl-C") in found.outcome_detail
 
 
 def test_an_error_of_the_harness_itself_leaves_robot_and_record_in_order(tmp_path: Path) -> None:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import sys
+import tomllib
 from pathlib import Path
+from urllib.parse import urlparse
+from urllib.request import url2pathname
 
+import jsonschema
 import pytest
 
 import hil
@@ -210,3 +215,19 @@ def test_a_class_that_is_none_is_told_what_is_missing(kind, decorator, missing, 
     refusal = command("check", kind, written(tmp_path / "hollow.py", text)).refusal
     assert "class Hollow has no " in refusal
     assert missing.replace("a outer", "an outer") in refusal
+
+
+@pytest.mark.parametrize("kind", ["robot", "scenario"])
+def test_a_new_file_names_the_installed_schema_and_keeps_it(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """The first line is the address of a schema that is there; the file is valid by it, a wrong one not."""
+    monkeypatch.chdir(tmp_path)
+    command("new", kind, "mine")
+    text = Path("mine.toml").read_text(encoding="utf-8")
+    address = text.splitlines()[0].removeprefix("#:schema ")
+    schema = json.loads(Path(url2pathname(urlparse(address).path)).read_text(encoding="utf-8"))
+    checker = jsonschema.Draft202012Validator(schema)
+    tree = tomllib.loads(text)
+    assert list(checker.iter_errors(tree)) == []
+    assert list(checker.iter_errors(tree | {"colour": "red"}))

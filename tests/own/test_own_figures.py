@@ -19,10 +19,14 @@ import pytest
 import hil as api
 from hil.analysis.costs import COST_FAILED, cost_of
 from hil.config.load import load_scenario
-from hil.core.figures import BY_NAME, metric_of
+from hil.core.errors import BadInput
+from hil.core.figures import BESIDE, BY_NAME, metric_of
+from hil.core.registries import FIGURES
 from hil.core.time_limit import TooLongError, time_limit
 from hil.record.manifest import read_manifest
 from hil.record.reader import read_run
+from hil.report.csv_table import write_csv
+from hil.study.campaign.plan import ROW_COLUMNS
 from hil.study.tune import Plan, candidate_costs
 from hil.tools.conformance import cost_report, figure_report
 from tests.cli.command import hil, run_pose
@@ -437,3 +441,27 @@ def test_a_figure_of_this_process_needs_no_file():
     with pytest.raises(api.BadInput, match="two have this name"):
         api.figure("ise_m2_s", unit="m", meaning="x")(last)
     assert cost_of("usual").of({}) == COST_FAILED
+
+
+def test_a_name_that_tables_have_is_refused(tmp_path: Path):
+    """Whatever stands beside the figures in results and CSV is no figure's name; all such are known."""
+    table = tmp_path / "runs.csv"
+    write_csv(table, [])
+    beside = set(table.read_text().strip().split(",")) - set(BY_NAME)
+    assert beside | ROW_COLUMNS == BESIDE
+    for name in sorted(BESIDE):
+        file = written(tmp_path / f"{name}.py", figure_text(name, "return 1.0"))
+        with pytest.raises(BadInput, match=f"tables have a column {name} beside"):
+            FIGURES.load_file(str(file))
+    assert FIGURES.load_file(str(written(tmp_path / "x.py", figure_text("seeds", "return 1.0"))))
+
+
+def test_a_figure_that_interrupts_leaves_a_closed_record(tmp_path: Path):
+    """The run is whole and its record says interrupted, status 130; what was written is readable."""
+    file = written(tmp_path / "stop.py", figure_text("stop_m", "raise KeyboardInterrupt"))
+    done = run_pose("--figure", file, *BRIEF, "--out", tmp_path / "run")
+    assert done.status == 130
+    record = read_run(tmp_path / "run")
+    assert (record.manifest.outcome, record.manifest.outcome_detail) == ("interrupted", "Ctrl-C")
+    assert record.samples["t_s"].size == 31
+    assert record.problems == ()

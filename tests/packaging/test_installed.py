@@ -147,6 +147,14 @@ def test_main_commands_from_another_folder(installed: Installed) -> None:
     assert installed.files() == before
 
 
+def test_a_cell_of_the_fault_matrix_from_another_folder(installed: Installed) -> None:
+    """A fault, its verdict and its page; the list of faults is the installed one's."""
+    cell = ("--fault", "camera stalls", "--at", "at speed", "--outer", "pid", "--out", "cells")
+    assert "1 of 1 cells are met" in installed.hil("faults", *cell)
+    assert (installed.work / "cells" / "faults.html").is_file()
+    assert "there are: encoder dead" in installed.hil("faults", "--fault", "nope", status=2)
+
+
 def test_code_generation_asks_for_a_folder(installed: Installed) -> None:
     """The installed package is not written into; a folder that is named gets every file."""
     before = installed.files()

@@ -23,14 +23,15 @@ from hil.record.writing import Keeping
 def written(folder, rows):
     """Write a journal of frames with values missing here and there, and return its path."""
     path = folder / "frames.journal"
-    writer = Journal(path, FRAME_NAMES, Keeping(folder))
+    keeping = Keeping(folder)
+    writer = Journal(keeping.open(path.name), FRAME_NAMES)
     rng = np.random.default_rng(rows)
     for number in range(rows):
         row = rng.normal(size=len(FRAME_NAMES))
         row[3], row[4] = number, number % 2
         row[rng.integers(5, len(FRAME_NAMES))] = np.nan
         writer.write(row.tolist())
-    writer.close()
+    keeping.close()
     return path
 
 

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from hil.core.errors import BadInput
-from hil.record.tlog import TlogWriter, install_dialect, read_tlog
-from hil.record.writing import Keeping
+from hil.record.tlog import install_dialect, log_entry, read_tlog
 from hil.wire import dialect
 
 START_US = 1_714_557_600_000_000
@@ -32,10 +31,8 @@ def frames() -> list[tuple[float, bytes]]:
 @pytest.fixture
 def log(tmp_path):
     path = tmp_path / "link.tlog"
-    writer = TlogWriter(path, START_US, Keeping(tmp_path))
-    for t_s, frame in frames():
-        writer.write(t_s, frame)
-    writer.close()
+    entries = (log_entry(START_US + round(t_s * 1e6), frame) for t_s, frame in frames())
+    path.write_bytes(b"".join(entries))
     return path
 
 

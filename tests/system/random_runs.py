@@ -185,8 +185,8 @@ def _too_fast(scenario: Scenario, samples: Mapping[str, Any]) -> Iterator[str]:
     bounds = {
         "eta1_cmd_m_s": limits.eta1_max_m_s,
         "theta_dot_cmd_rad_s": limits.theta_dot_max_rad_s,
-        "omega_cmd_left_rad_s": wheel_speed_max_rad_s(scenario),
-        "omega_cmd_right_rad_s": wheel_speed_max_rad_s(scenario),
+        "omega_cmd_left_rad_s": wheel_speed_max_rad_s(scenario.board),
+        "omega_cmd_right_rad_s": wheel_speed_max_rad_s(scenario.board),
     }
     if not scenario.faults:  # a motor that is wired wrongly is not commanded
         larger = scenario.mismatch.get("wheel_radius_m", 1.0)

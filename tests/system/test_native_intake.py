@@ -19,15 +19,14 @@ from hil.board.wheel_laws import WHEEL_LAWS
 from hil.config.fit import board_parameters
 from hil.config.load import load_scenario
 from hil.control.laws import chain
+from hil.control.laws.making import make_law, make_outer_law
 from hil.core import _native as core_native
 from hil.core.clocks import CameraClock
-from hil.core.registries import OUTER_LAWS
 from hil.record.memory import MemoryRecorder
 from hil.rigs.opening import open_rig
-from hil.runs import intake, session
+from hil.runs import session
 from hil.runs.assembly import limited, make_parts
 from hil.runs.execute import execute_in_memory
-from hil.runs.law_guard import at_rest, bare_law, make_law
 from hil.runs.provenance import make_manifest, used_things
 from hil.runs.session import Session
 from hil.runs.spec import RunSpec
@@ -102,7 +101,7 @@ def parts_of(spec):
 def run(case, make_pump, make_drive):
     """Return the record of a case with the intake and the ticks that these give."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(intake, "make_pump", make_pump)
+        patch.setattr(session, "make_pump", make_pump)
         patch.setattr(session, "make_drive", make_drive)
         return execute_in_memory(spec_of(case))
 
@@ -137,7 +136,7 @@ def in_python(case):
     return run(case, lambda *_: None, REAL_DRIVE)
 
 
-REAL, REAL_DRIVE = intake.make_pump, session.make_drive
+REAL, REAL_DRIVE = session.make_pump, session.make_drive
 
 
 def differences(one, other):
@@ -194,10 +193,11 @@ def test_the_comparison_sees_a_changed_law():
 
     def make_drive(parts, *rest):
         scenario = spec_of(ONE).scenario
-        gains = scenario.control.active_gains.asg_ism
-        other = gains.model_copy(update={"k1_s": math.nextafter(gains.k1_s, math.inf)})
-        entry = OUTER_LAWS.get("asg-ism")
-        law = at_rest(entry, bare_law(entry, other, scenario), scenario.control.limits)
+        gains = scenario.control.active_gains
+        own = gains.asg_ism
+        other = own.model_copy(update={"k1_s": math.nextafter(own.k1_s, math.inf)})
+        d0_m, limits = scenario.robot.d0_m, scenario.control.limits
+        law = make_outer_law("asg-ism", gains.model_copy(update={"asg_ism": other}), limits, d0_m)
         changed = replace(parts, law=limited(law, parts.vehicle, scenario))
         return REAL_DRIVE(changed, *rest)
 
@@ -267,7 +267,7 @@ def test_what_native_code_cannot_do_is_left_to_python(what, more):
     spec = replace(spec_of(ONE), scenario=load_scenario("scenario-1", ["duration_s=1.5", *more]))
     made = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(intake, "make_pump", lambda *parts: made.append(REAL(*parts)) or made[-1])
+        patch.setattr(session, "make_pump", lambda *parts: made.append(REAL(*parts)) or made[-1])
         record = execute_in_memory(spec)
     assert made == [None], what
     assert record.manifest.tick_count > 30

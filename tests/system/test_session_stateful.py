@@ -23,10 +23,10 @@ from hypothesis.stateful import (
 
 from hil.config.fit import board_parameters
 from hil.config.load import load_scenario
+from hil.control.laws.making import make_law
 from hil.record.memory import MemoryRecorder
 from hil.rigs.opening import open_rig
 from hil.runs.assembly import make_parts
-from hil.runs.law_guard import make_law
 from hil.runs.parts import Situation
 from hil.runs.provenance import make_manifest, used_things
 from hil.runs.session import Session

@@ -28,7 +28,10 @@ def localiser_of_frames(camera: CameraConfig, *, drawn: bool) -> Looker:
 
     Where poses are `drawn` its projections need not be worked out until an image comes after all.
     """
-    return _WhenAsked(camera) if drawn else looker(make_localiser(camera))
+    if drawn:
+        return _WhenAsked(camera)
+    localiser = make_localiser(camera)
+    return looker(localiser)
 
 
 class _WhenAsked:

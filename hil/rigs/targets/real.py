@@ -20,4 +20,10 @@ def serial(asked: Asked) -> Rig:
     from hil.rigs.serial import SerialRig, parse_target  # noqa: PLC0415
 
     device, baud = parse_target(f"serial:{asked.where}")
-    return SerialRig(device, baud, open_source(asked.camera, asked.scenario.camera))
+    rig = SerialRig(device, baud, None)  # the port first: it is what was asked for by name
+    try:
+        rig.watch_by(open_source(asked.camera, asked.scenario.camera))
+    except BaseException:
+        rig.close()
+        raise
+    return rig

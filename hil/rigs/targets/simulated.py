@@ -62,4 +62,23 @@ def _frame_maker(asked: Asked) -> Any:
         )
     from sim_twin.camera_sim import RenderedCamera  # noqa: PLC0415
 
+    _refuse_out_of_view(asked.scenario)
     return RenderedCamera(asked.scenario.camera, asked.seed)
+
+
+def _refuse_out_of_view(scenario: Scenario) -> None:
+    """Raise BadInput where the camera does not see the robot's middle at the start: no run can begin so."""
+    from vision.camera_setup import camera_model  # noqa: PLC0415 - with the renderer
+
+    camera, start = scenario.camera, scenario.start
+    model, (width, height) = camera_model(camera), (camera.width_px, camera.height_px)
+    u_px, v_px = model.project_point(start.x_m, start.y_m, camera.marks.height_m)
+    if 0.0 <= u_px < width and 0.0 <= v_px < height:
+        return
+    corners = model.floor_points([(0, 0), (width, 0), (width, height), (0, height)])
+    (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
+    raise BadInput(
+        f"start ({start.x_m:g}, {start.y_m:g}) m: the rendered camera does not see the robot there, but X "
+        f"{x0:.2f} to {x1:.2f} m and Y {y0:.2f} to {y1:.2f} m of the floor; take --camera pose, or set "
+        "start.x_m, start.y_m or camera.pose.eye_m"
+    )

@@ -18,7 +18,6 @@ from hil.board.wheel_laws import WHEEL_LAWS, require_wheel_law
 from hil.config.base import PlainName, Section
 from hil.config.control import OuterLawName
 from hil.config.gains import only_gains_of
-from hil.config.limits import check_board
 from hil.config.load import build, load_scenario, put_value, read_tree
 from hil.config.scenario import Scenario
 from hil.core import figures
@@ -230,9 +229,7 @@ class Campaign:
         tree = copy.deepcopy(self.base)
         for name, value in point:
             put_value(tree, name, value)
-        scenario = build(Scenario, tree, self.file.name)
-        check_board(scenario.board)
-        return scenario
+        return build(Scenario, tree, self.file.name)
 
 
 class Jobs(Sequence[Job]):
@@ -306,14 +303,19 @@ def _refuse_taken_names(campaign: Campaign, path: Path) -> None:
     for name in campaign.axes:
         if name in campaign.figures or name in ROW_COLUMNS:
             raise BadInput(
-                f"{path}: {name}: cannot be varied: a column of the results has this name; vary "
-                "another value, or write a campaign for each"
+                f"{path}: {name}: cannot be varied: the results have {_what(name)} of this name, and the "
+                "two would be one column; write a campaign for each value of it, with "
+                f'set = ["{name}=VALUE"]'
             )
     for name in campaign.figures:
         if name in ROW_COLUMNS:
             raise BadInput(
                 f"{path}: figures: {name}: another column of the results has this name; rename the figure"
             )
+
+
+def _what(name: str) -> str:
+    return f"a figure ({metric_of(name).definition})" if name in BY_NAME else "a column"
 
 
 def _refuse_twice(

@@ -12,11 +12,11 @@ import numpy as np
 from hil.analysis.costs import Cost
 from hil.analysis.own_figures import value_of
 from hil.config.load import load_scenario
+from hil.control.laws.making import make_law
 from hil.core.figures import BY_NAME, declared
 from hil.core.registries import FIGURES, TUNING_COSTS
 from hil.core.registry import Entry, in_one_line, place_of
 from hil.runs.execute import execute_in_memory
-from hil.runs.law_guard import make_law
 from hil.tools.conformance.laws import SCENARIO, Turned, spec_of
 from hil.tools.conformance.report import Checks, Named, Report, Violation, entry_of
 from hil.tools.conformance.watch import Heard, require_no_clock, require_no_random, watch

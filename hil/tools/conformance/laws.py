@@ -15,15 +15,17 @@ import numpy as np
 from hil.config.control import OuterLimits
 from hil.config.load import load_scenario
 from hil.config.scenario import Scenario
+from hil.control.laws.guard import STEP_MAX_S
+from hil.control.laws.making import make_law
 from hil.core.errors import RigFault
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import Entry
 from hil.core.time_limit import TooLongError, time_limit
 from hil.core.types import OuterCommand, OuterLaw
 from hil.record.reader import RunRecord
-from hil.record.schema import LAW_COLUMNS, own_columns
+from hil.record.schema import LAW_COLUMNS
 from hil.runs.execute import RunSpec, execute_in_memory
-from hil.runs.law_guard import STEP_MAX_S, make_law
+from hil.runs.provenance import trace_terms
 from hil.tools.conformance.floor import Episode, episodes, mirrored
 from hil.tools.conformance.report import Checks, Named, Report, Violation, entry_of
 from hil.tools.conformance.watch import Heard, require_no_clock, require_no_random, watch
@@ -83,7 +85,7 @@ def check_law(law: Named, *, scenario: str = SCENARIO, overrides: Sequence[str] 
 def law_report(law: Named, *, scenario: str = SCENARIO, overrides: Sequence[str] = ()) -> Report:
     """Return what the kit finds of a law; raises BadInput when there is no such law."""
     with entry_of(OUTER_LAWS, law) as entry:
-        own_columns(entry)
+        trace_terms(entry)
         resolved = load_scenario(scenario, overrides)
         checks = Checks("law", entry.name, entry.origin)
         bench = Bench(entry, resolved, episodes(resolved, _FEW_TICKS))

@@ -10,21 +10,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from hil.control.laws.hold import HoldAtGoal
 from hil.core.errors import HilError, RigFault
-from hil.core.registries import OUTER_LAWS
-from hil.core.registry import BUILT_IN, in_one_line, place_of
+from hil.core.registry import in_one_line, place_of
 from hil.core.time_limit import TooLongError, time_limit
 from hil.core.types import OuterCommand
 from hil.core.wording import past
 
 if TYPE_CHECKING:
     from hil.config.control import OuterLimits
-    from hil.config.scenario import Scenario
     from hil.core.registry import Entry
     from hil.core.types import Estimate, OuterLaw, ReferenceState
 
@@ -99,28 +96,3 @@ class GuardedLaw:
 
     def _fault(self, said: str, error: BaseException | None = None) -> RigFault:
         return RigFault(f"law {self._entry.name} ({place_of(self._entry, error)}): {said}")
-
-
-def make_law(outer: str, scenario: Scenario) -> OuterLaw:
-    """Return the outer law of a run, guarded where it comes from outside.
-
-    Raises BadInput for an unknown one, RigFault for one that fails while it is made.
-    """
-    entry, control = OUTER_LAWS.get(outer), scenario.control
-    law = bare_law(entry, control.active_gains.of(entry), scenario)
-    return at_rest(entry, law, control.limits)
-
-
-def bare_law(entry: Entry, gains: Any, scenario: Scenario) -> OuterLaw:
-    """Return the law with these gains, without the rest at the goal; raises as `make_law`."""
-    limits, d0_m = scenario.control.limits, scenario.robot.d0_m
-    if entry.origin == BUILT_IN:
-        law: OuterLaw = entry.factory(gains, limits, d0_m)
-        return law
-    return GuardedLaw(entry, lambda: entry.factory(gains, limits, d0_m), limits)
-
-
-def at_rest(entry: Entry, law: OuterLaw, limits: OuterLimits) -> OuterLaw:
-    """Return the law with the rest at the goal, if it wants that."""
-    rests = entry.origin == BUILT_IN or bool(entry.extra.get("hold", True))
-    return HoldAtGoal(law, limits) if rests else law
