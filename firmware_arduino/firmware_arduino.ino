@@ -25,13 +25,14 @@ Board g_board;
 uint8_t g_ticks_done;
 uint16_t g_longest_us;  // tick of this second
 uint8_t g_ticks_to_load_report = 250;
+bool g_hashing;  // the core has signatures to check or to make
 
 // Idle keeps timers and serial ports running. The look is taken with interrupts off, or one that came
 // between the look and the sleep would wait for the next.
 void sleep_until_work() {
   for (;;) {
     cli();
-    if (ticker::count() != g_ticks_done || uart::has_received()) break;
+    if (ticker::count() != g_ticks_done || uart::has_received() || g_hashing) break;
     sleep_enable();
     sei();
     sleep_cpu();
@@ -84,12 +85,17 @@ void setup() { start(); }
 
 void loop() {
   sleep_until_work();
-  host_port::pump(g_board);
+  // A slice may have taken long, and bytes may have waited for it: a tick that is due waits for no more.
+  if (!g_hashing || ticker::count() == g_ticks_done) host_port::pump(g_board);
   const uint8_t now = ticker::count();
-  if (now == g_ticks_done) return;
+  if (now == g_ticks_done) {
+    g_hashing = board_idle(g_board);
+    return;
+  }
   g_ticks_done = now;
   tick();
   host_port::pump(g_board);
   board_slack(g_board);
+  g_hashing = board_hashes(g_board);
   restart::feed_watchdog();
 }

@@ -89,7 +89,9 @@ def disturbance_value(
 ) -> float:
     """Return what a disturbance adds at a time and place."""
 
-def host_board(clock_ppm: float, clock_start_us: int, baud: float) -> object:
+def host_board(
+    clock_ppm: float, clock_start_us: int, baud: float, wired: bool = False, eeprom: bytes = b""
+) -> object:
     """Return the handle of a board that is the firmware core compiled for this machine."""
 
 class Kernel:

@@ -66,7 +66,9 @@ class Pil(Twin):
             )
         self.build: Build | None = None if firmware else build()
         elf = firmware if self.build is None else self.build.elf
-        self.board = pil_module()(str(elf), uart, setup.robot.board_clock_ppm, eeprom)
+        self.board = pil_module()(
+            str(elf), uart, setup.robot.board_clock_ppm, eeprom or setup.eeprom
+        )
         super().__init__(setup, maker, self.board.handle())
 
     @property

@@ -24,7 +24,11 @@ PARTS: dict[str, tuple[str, ...]] = {
         "uart.cpp:__vector_37",
     ),
     "timer interrupt": ("ticker.cpp:__vector_47",),
-    "link: receive": ("host_port.cpp:receive", "host_port.cpp:watch_other"),
+    "link: receive": (
+        "host_port.cpp:receive",
+        "host_port.cpp:watch_other",
+        "board.cpp:act_on_checked",
+    ),
     "link: transmit": ("host_port.cpp:transmit",),
     "tick: sense": ("encoders.cpp:read", "battery.cpp:read_mv", "board.cpp:sense"),
     "tick: estimate": ("board.cpp:estimate",),
@@ -34,6 +38,14 @@ PARTS: dict[str, tuple[str, ...]] = {
     "tick: actuate": ("board.cpp:actuate", "motors.cpp:write", "motors.cpp:show_armed"),
     "tick: report": ("board.cpp:report_tick", "report.cpp:report_tick"),
     "tick: rest": ("firmware_arduino.ino:tick",),
+    "signing": (
+        "board.cpp:board_idle",
+        "link.cpp:link_begin_hash",
+        "link.cpp:mark_signed",
+        "signer.cpp:signer_tick",
+        "signer.cpp:signer_slice",
+        "sha256.cpp:sha256_slice",
+    ),
     "main loop": ("firmware_arduino.ino:loop",),
 }
 _VECTORS = {

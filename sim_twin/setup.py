@@ -45,15 +45,21 @@ def make_kernel(
     disturbances: Sequence[Disturbance] = (),
     faults: Sequence[Fault] = (),
     board: object | None = None,
+    *,
+    wired: bool = False,
+    eeprom: bytes = b"",
 ) -> _native.Kernel:
     """Return robot and board at rest at the origin, with every event of the scenario loaded.
 
     `rng` draws what nobody sets: when the board was switched on, and the noise. `board` is the
-    handle of another board than the firmware core compiled for this machine.
+    handle of another board than the firmware core compiled for this machine, which is met on its USB
+    port where it is `wired`, and has `eeprom` in its storage.
     """
     clock_start_us = rng.randrange(2_000_000, 600_000_000)
     if board is None:
-        board = _native.host_board(robot.board_clock_ppm, clock_start_us, float(baud))
+        board = _native.host_board(
+            robot.board_clock_ppm, clock_start_us, float(baud), wired, eeprom
+        )
     kernel = _native.Kernel(
         plant_params(robot),
         step_us=STEP_US,

@@ -43,7 +43,11 @@ POSES_PER_READOUT = 17
 
 @dataclass(frozen=True, slots=True)
 class TwinSetup:
-    """All that the simulated rig is made of; `start` is the robot's pose at rest."""
+    """All that the simulated rig is made of; `start` is the robot's pose at rest.
+
+    `eeprom` is what the board's storage holds at first, the rest of it erased; `wired` says that the
+    host is on the board's USB port, and not on its Bluetooth one.
+    """
 
     robot: RobotConfig
     link: LinkConfig
@@ -52,6 +56,8 @@ class TwinSetup:
     seed: int
     disturbances: tuple[Disturbance, ...] = ()
     faults: tuple[Fault, ...] = ()
+    eeprom: bytes = b""
+    wired: bool = False
 
 
 class TwinStream:
@@ -104,8 +110,9 @@ class Twin:
         self._pictures = FaultyMaker(maker, setup.faults, lambda: _covered_maker(setup))
         self._host = HostFaults(setup.faults)
         self._kernel = make_kernel(
-            setup.robot, setup.link.baud, rng("kernel"), setup.disturbances, setup.faults, board
-        )
+            setup.robot, setup.link.baud, rng("kernel"), setup.disturbances, setup.faults, board,
+            wired=setup.wired, eeprom=setup.eeprom,
+        )  # fmt: skip
         self._kernel.reset(setup.start.x_m, setup.start.y_m, setup.start.theta_rad)
         self._rig = _native.Rig(
             self._kernel,

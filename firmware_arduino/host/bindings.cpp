@@ -188,6 +188,7 @@ class Board {
       const uint16_t n = hil::board_receive(board_, at, most, t_us);
       at += n;
       left -= n;
+      hash_all();
     }
   }
 
@@ -197,6 +198,7 @@ class Board {
     hil::board_tick(board_, {t_us, counts_left, counts_right, encoder_faults, battery_mv}, out);
     write_byte();
     hil::board_slack(board_);
+    hash_all();
     return {out.pwm_left, out.pwm_right};
   }
 
@@ -212,6 +214,7 @@ class Board {
   }
 
   const hil::Board& state() const { return board_; }
+  void set_wired(bool wired) { board_.wired = wired; }
   const hil::Wheel& wheel(uint8_t side) const {
     if (side >= hil::SIDES) throw nb::index_error("side is 0 (left) or 1 (right)");
     return board_.wheel[side];
@@ -227,8 +230,13 @@ class Board {
     if (hil::board_store(board_, byte)) eeprom_[byte.address] = byte.value;
   }
 
+  void hash_all() {
+    while (hil::board_idle(board_)) {
+    }
+  }
+
   hil::Board board_;
-  std::array<uint8_t, hil::STORAGE_SIZE> eeprom_;
+  std::array<uint8_t, hil::BOARD_STORAGE_SIZE> eeprom_;
   hil::ImageResult result_;
 };
 
@@ -300,6 +308,10 @@ void bind_board(nb::module_& m) {
       .def_prop_ro("loaded", &Board::loaded)
       .def_prop_ro("eeprom", &Board::eeprom)
       .def("wheel", &Board::wheel, "side"_a, nb::rv_policy::reference_internal)
+      .def_prop_rw(
+          "wired", [](const Board& b) { return b.state().wired; }, &Board::set_wired)
+      .def_prop_ro("signs", [](const Board& b) { return b.state().link.signer.mode == hil::Signing::ON; })
+      .def_prop_ro("stamp", [](const Board& b) { return b.state().link.signer.now; })
       .def_prop_ro("state", [](const Board& b) { return b.state().safety.state; })
       .def_prop_ro("reason", [](const Board& b) { return b.state().safety.reason; })
       .def_prop_ro("parameters", [](const Board& b) { return values_of(b.state().params); })
@@ -312,7 +324,46 @@ void bind_board(nb::module_& m) {
       .def_prop_ro("dropped_frames", [](const Board& b) { return b.state().link.dropped; });
 }
 
+// Digest of the core's SHA-256 over any bytes.
+nb::bytes sha256(const nb::bytes& data) {
+  std::vector<uint8_t> text(data_of(data), data_of(data) + data.size());
+  text.push_back(0x80);
+  while (text.size() % hil::SHA_BLOCK != hil::SHA_BLOCK - 8) text.push_back(0);
+  for (int shift = 56; shift >= 0; shift -= 8) {
+    text.push_back(static_cast<uint8_t>(static_cast<std::uint64_t>(data.size()) * 8 >> shift));
+  }
+  hil::Sha256 sha;
+  hil::sha256_init(sha);
+  for (std::size_t at = 0; at < text.size(); at += hil::SHA_BLOCK) {
+    hil::sha256_words(sha, 0, text.data() + at, 16);
+    hil::sha256_begin(sha);
+    while (!hil::sha256_slice(sha)) {
+    }
+  }
+  std::string digest;
+  for (const uint32_t word : sha.h) {
+    for (int shift = 24; shift >= 0; shift -= 8) digest.push_back(static_cast<char>(word >> shift & 0xFF));
+  }
+  return nb::bytes(digest.data(), digest.size());
+}
+
+// What the EEPROM of a board holds that was given this key at `stamp`, and nothing else.
+nb::bytes stored_key(const nb::bytes& key, std::uint64_t stamp) {
+  if (key.size() != hil::KEY_SIZE) throw nb::value_error("a key has 32 bytes");
+  std::string storage(hil::BOARD_STORAGE_SIZE, '\xFF');
+  hil::Signer signer{};
+  hil::signer_set_key(signer, data_of(key), stamp);
+  for (int ticks = 0; ticks < 2; ++ticks) {
+    hil::StoredByte byte{};
+    while (hil::signer_store(signer, byte)) storage[byte.address] = static_cast<char>(byte.value);
+    hil::signer_tick(signer);
+  }
+  return nb::bytes(storage.data(), storage.size());
+}
+
 void bind_facts(nb::module_& m) {
+  m.def("sha256", &sha256, "data"_a);
+  m.def("stored_key", &stored_key, "key"_a, "stamp"_a);
   nb::class_<Parameter>(m, "Parameter")
       .def_ro("name", &Parameter::name)
       .def_ro("default", &Parameter::initial)

@@ -64,6 +64,33 @@ struct Host {
   }
 };
 
+// The sender with the key: makes frames signed ones.
+class Signing {
+ public:
+  explicit Signing(const uint8_t (&key)[hil::KEY_SIZE]) { hil::signer_set_key(signer_, key, 0); }
+
+  Bytes sign(Bytes frame, hil::Stamp stamp) {
+    uint16_t change = 0;
+    crc_accumulate(MAVLINK_IFLAG_SIGNED, &change);
+    for (size_t i = 3; i + 2 < frame.size() + 1; ++i) crc_accumulate(0, &change);
+    frame[2] |= MAVLINK_IFLAG_SIGNED;
+    frame[frame.size() - 2] ^= static_cast<uint8_t>(change);
+    frame[frame.size() - 1] ^= static_cast<uint8_t>(change >> 8);
+    frame.push_back(0);
+    for (int i = 0; i < hil::STAMP_SIZE; ++i) frame.push_back(static_cast<uint8_t>(stamp >> 8 * i));
+    memcpy(signer_.text, frame.data(), frame.size());
+    hil::signer_begin(signer_, hil::HashJob::SIGN, static_cast<uint8_t>(frame.size()));
+    uint8_t signature[hil::SIGNATURE_SIZE];
+    while (!hil::signer_slice(signer_, signature)) {
+    }
+    frame.insert(frame.end(), signature, signature + hil::SIGNATURE_SIZE);
+    return frame;
+  }
+
+ private:
+  hil::Signer signer_{};
+};
+
 // A frame the board understands, with arguments that need not make sense.
 Bytes plausible(Host& host, Random& rng) {
   switch (rng.below(6)) {
@@ -106,6 +133,12 @@ class Rig {
     for (uint16_t at = 0; at < size;) {
       at = static_cast<uint16_t>(
           at + hil::board_receive(board, bytes.data() + at, static_cast<uint16_t>(size - at), t_us));
+      hash_all();
+    }
+  }
+
+  void hash_all() {
+    while (hil::board_idle(board)) {
     }
   }
 
@@ -115,6 +148,7 @@ class Rig {
     hil::StoredByte byte;
     hil::board_store(board, byte);
     hil::board_slack(board);
+    hash_all();
     t_us += hil::TICK_US;
     const bool armed = board.safety.state == HIL_STATE_ARMED;
     if (!armed && (out.pwm_left != 0 || out.pwm_right != 0)) fail("wheels driven while not armed");
@@ -148,13 +182,17 @@ class Rig {
     return false;
   }
 
+  Bytes arming() {
+    const uint32_t d = board.dialect_hash, p = board.parameter_hash;
+    return host.command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0f, static_cast<float>(d >> 16),
+                        static_cast<float>(d & 0xFFFFu), static_cast<float>(p >> 16),
+                        static_cast<float>(p & 0xFFFFu));
+  }
+
   void arm() {
     hil::params_defaults(board.params);
     board.parameter_hash = hil::params_hash(board.params);
-    const uint32_t d = board.dialect_hash, p = board.parameter_hash;
-    feed(host.command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0f, static_cast<float>(d >> 16),
-                      static_cast<float>(d & 0xFFFFu), static_cast<float>(p >> 16),
-                      static_cast<float>(p & 0xFFFFu)));
+    feed(arming());
   }
 
   Random rng;
@@ -197,6 +235,53 @@ void armed(uint32_t frames, uint64_t seed) {
   if (frames >= 1000 && armed_ticks < frames / 20) fail("hardly ever armed: the test tests nothing");
 }
 
+// A board with a key, driven by a host that has it, among frames without signatures, with another key's, with
+// bits turned, and heard before: nothing but what the host has signed is in force, ever.
+void keyed(uint32_t frames, uint64_t seed) {
+  uint8_t key[hil::KEY_SIZE], other[hil::KEY_SIZE];
+  Rig rig(seed);
+  for (uint8_t i = 0; i < hil::KEY_SIZE; ++i) {
+    key[i] = static_cast<uint8_t>(rig.rng.next());
+    other[i] = static_cast<uint8_t>(rig.rng.next());
+  }
+  Signing good(key), bad(other);
+  hil::signer_set_key(rig.board.link.signer, key, 0);
+  for (int i = 0; i < 200; ++i) rig.tick(0, 0);
+  const uint32_t parameters = hil::params_hash(rig.board.params);
+  const auto now = [&rig] { return rig.board.link.signer.now + 1; };
+  uint16_t seq = 0;
+  int32_t counts = 0;
+  uint32_t armed_ticks = 0;
+  Bytes heard = good.sign(rig.host.setpoint(9.0f, 9.0f, 1), now());
+  rig.feed(heard);
+  for (uint32_t i = 0; i < frames; ++i) {
+    if (rig.board.safety.state != HIL_STATE_ARMED) rig.feed(good.sign(rig.arming(), now()));
+    rig.feed(good.sign(rig.host.setpoint(1.0f, 1.0f, ++seq), now()));
+    const Bytes plain = plausible(rig.host, rig.rng);
+    Bytes forged = plain;
+    if (rig.rng.below(2) == 0) forged = bad.sign(plain, now());
+    if (rig.rng.below(4) == 0) {
+      forged = good.sign(plain, now());
+      const uint32_t place = 1 + rig.rng.below(static_cast<uint32_t>(forged.size()) - 1);
+      forged[place] ^= static_cast<uint8_t>(1u << rig.rng.below(8));
+      rig.feed(forged);
+    } else {
+      rig.feed(mutated(forged, rig.rng, heard));
+    }
+    counts += rig.board.wheel[hil::LEFT].pwm / 64;
+    rig.tick(counts, counts);
+    const hil::Setpoint& now_set = rig.board.setpoint;
+    for (const float speed : now_set.omega_rad_s) {
+      if (speed != 1.0f && speed != 0.0f) fail("a set-point that was not signed is in force");
+    }
+    if (hil::params_hash(rig.board.params) != parameters) fail("a parameter was set without a signature");
+    if (rig.board.link.signer.mode != hil::Signing::ON) fail("the key is gone");
+    armed_ticks += rig.board.safety.state == HIL_STATE_ARMED;
+  }
+  if (frames >= 1000 && armed_ticks < frames / 20)
+    fail("hardly ever armed with a key: the test tests nothing");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -205,6 +290,7 @@ int main(int argc, char** argv) {
   const uint64_t seed = strtoull(argv[2], nullptr, 10);
   unarmed(frames, seed);
   armed(frames, seed + 1);
-  printf("%u frames unarmed, %u armed: no fault\n", frames, frames);
+  keyed(frames / 4, seed + 2);
+  printf("%u frames unarmed, %u armed, %u with a key: no fault\n", frames, frames, frames / 4);
   return 0;
 }

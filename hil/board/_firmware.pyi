@@ -193,6 +193,12 @@ class ImageResult(enum.Enum):
     BLANK = 1
     DAMAGED = 2
 
+def sha256(data: bytes) -> bytes:
+    """Return the digest of the core's SHA-256."""
+
+def stored_key(key: bytes, stamp: int) -> bytes:
+    """Return what the EEPROM of a board holds that was given this signing key at this time stamp."""
+
 class Board:
     """The whole board below the pins."""
 
@@ -214,6 +220,17 @@ class Board:
 
     def transmit(self, limit: int = 256) -> bytes:
         """Return up to `limit` bytes for the serial port."""
+
+    @property
+    def signs(self) -> bool:
+        """True where it has a signing key."""
+
+    @property
+    def stamp(self) -> int:
+        """Its own time stamp, in 10 us since 2015."""
+
+    wired: bool
+    """What it receives comes over the USB port."""
 
     @property
     def loaded(self) -> ImageResult:

@@ -35,7 +35,7 @@ _COMMON = (
 )  # fmt: skip
 _CXX = ("-std=gnu++11", "-fpermissive", "-fno-exceptions", "-fno-threadsafe-statics")
 _STRICT = ("-Wall", "-Wextra", "-Werror")
-_SOURCES = {".ino", ".cpp", ".c", ".h", ".def"}
+_SOURCES = {".ino", ".cpp", ".c", ".S", ".h", ".def"}
 
 
 # What writes a program to a board, in the order in which they are looked for.
@@ -175,6 +175,11 @@ def _compile_commands(
     identity = f'-DHIL_BUILD_ID="{build_id}"'
     own = [path for path in _sketch_sources(sketch) if path.suffix in {".ino", ".cpp", ".c"}]
     commands = []
+    for path in _sketch_sources(sketch):
+        if path.suffix == ".S":
+            name = f"{path.name}.o"
+            assembler = [tools.tool("gcc"), *_COMMON, "-x", "assembler-with-cpp"]
+            commands.append([*assembler, "-c", str(path), "-o", str(objects / name)])
     for path in own:
         name = str(path.relative_to(sketch)).replace(os.sep, "_")
         cxx = [tools.tool("g++"), *_COMMON, *_CXX, *_STRICT, *include, identity, "-x", "c++"]

@@ -75,6 +75,48 @@ def codegen(check: bool, out: Path | None) -> int:
 
 
 @command.group()
+def key() -> None:
+    """Make a signing key; set it on a board, or erase it there, over its USB port."""
+
+
+@key.command("new")
+@click.argument("file", type=_FILE)
+@click.option("--passphrase", is_flag=True,
+              help="Ask for a passphrase, and make the key of it as MAVProxy does.")  # fmt: skip
+def new_key(file: Path, passphrase: bool) -> None:
+    """Write a new key to FILE, for you alone to read."""
+    from hil.rigs import key_file
+
+    asked = ""
+    if passphrase:
+        asked = click.prompt("passphrase", hide_input=True, confirmation_prompt=True)
+    key_file.new_key(file, asked)
+    click.echo(f"written: {visible(str(file))}; set it on a board: hil firmware key set")
+
+
+@key.command("set")
+@click.argument("file", type=_FILE)
+@_port_option
+def set_key(file: Path, target: str) -> None:
+    """Give the board the key in FILE; from then on it acts on nothing else than what is signed with it."""
+    from hil.rigs.key_file import read_key
+    from hil.tools.board_key import set_board_key
+
+    set_board_key(target, read_key(file))
+    click.echo("set and stored; name the file from now on: --key FILE, or HIL_KEY=FILE")
+
+
+@key.command("clear")
+@_port_option
+def clear_key(target: str) -> None:
+    """Erase the board's key; from then on it acts on whatever reaches it."""
+    from hil.tools.board_key import clear_board_key
+
+    clear_board_key(target)
+    click.echo("erased: the board takes unsigned frames")
+
+
+@command.group()
 def params() -> None:
     """List, set, save and compare the parameters of a board."""
 

@@ -52,6 +52,10 @@ figure_option = click.option(
     help="Figure of merit beside the built-in ones: FILE.py, FILE.py:NAME, or a name that `hil list "
     "figures` shows; may be repeated.",
 )  # fmt: skip
+key_option = click.option(
+    "--key", "key_file", type=click.Path(path_type=Path), metavar="FILE",
+    help="Signing key of the board; a simulated one is given it.  [default for ports: HIL_KEY]",
+)  # fmt: skip
 out_option = click.option(
     "--out", type=click.Path(path_type=Path), metavar="DIR",
     help="Folder for the record(s); must not exist or be empty. [default: a new one in runs/]",

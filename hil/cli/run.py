@@ -16,6 +16,7 @@ from hil.cli.options import (
     figure_option,
     inner_option,
     json_option,
+    key_option,
     out_option,
     outer_option,
     print_json,
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 @set_option
 @figure_option
 @out_option
+@key_option
 @click.option("--record-camera", is_flag=True,
               help="Keep every frame in camera.mkv, lossless: 17 MB a second at 640 x 480.")  # fmt: skip
 @click.option("--record-camera-small", "small_video", is_flag=True,
@@ -65,6 +67,7 @@ def command(
     overrides: tuple[str, ...],
     own_figures: tuple[str, ...],
     out: Path | None,
+    key_file: Path | None,
     record_camera: bool,
     small_video: bool,
     bridge: str | None,
@@ -80,6 +83,7 @@ def command(
     from hil.core.registries import OUTER_LAWS
     from hil.record.beside import ViewerFile
     from hil.record.manifest import command_line
+    from hil.rigs.key_file import read_key
     from hil.runs.execute import RunSpec, camera_for, execute, exit_status, new_folder
 
     if record_camera and small_video:
@@ -98,6 +102,7 @@ def command(
         record_camera=record_camera,
         small_video=small_video,
         command=command_line(),
+        key=read_key(key_file) if key_file else None,
     )
     with (
         ViewerFile() if spec.is_simulated else nullcontext() as viewer,

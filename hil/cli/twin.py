@@ -30,6 +30,9 @@ def command() -> None:
               help="Unix socket that gives the camera's frames.  [default: beside the port]")  # fmt: skip
 @click.option("--camera", default="rendered", show_default=True, metavar="SOURCE",
               help="rendered or pose.")  # fmt: skip
+@click.option("--usb", is_flag=True,
+              help="The port stands for the board's USB port, where its signing key is set; else for the "
+              "Bluetooth one.")  # fmt: skip
 @click.option("--duration", "duration_s", type=click.FloatRange(0.1), metavar="SECONDS",
               help="End by itself after this time. [default: at Ctrl-C]")  # fmt: skip
 @seed_option
@@ -39,6 +42,7 @@ def serve(
     pty: Path | None,
     frames: Path | None,
     camera: str,
+    usb: bool,
     duration_s: float | None,
     seed: int,
     overrides: tuple[str, ...],
@@ -58,7 +62,7 @@ def serve(
     from hil.config.load import load_scenario
     from hil.rigs.opening import open_rig
 
-    rig = open_rig("twin", load_scenario(scenario, overrides), camera, seed)
+    rig = open_rig("twin", load_scenario(scenario, overrides), camera, seed, usb=usb)
     server, names = _serving(rig, pty, frames)
     try:
         click.echo(f"board on {names[0]}, camera on {names[1]}; Ctrl-C ends it", err=True)

@@ -20,6 +20,7 @@ from hil.console.folders import Folders, confined
 from hil.console.people import Page, People
 from hil.core.errors import BadInput
 from hil.core.text import visible
+from hil.study.campaign.plan import column_of
 from hil.study.campaign.results import CAMPAIGN, PAGE, PARTS, RESULTS
 
 _LOOK_S = 1.0
@@ -204,8 +205,9 @@ def rows_of(folder: Path) -> dict[str, Any]:
     )
     rows: list[list[Any]] = []
     for file in files:
-        table = pq.read_table(file, columns=[*axes, "outer", "holds"])
-        columns = [table.column(name).to_pylist() for name in (*axes, "outer", "holds")]
+        wanted = [*map(column_of, axes), "outer", "holds"]
+        table = pq.read_table(file, columns=wanted)
+        columns = [table.column(name).to_pylist() for name in wanted]
         rows += [list(row) for row in zip(*columns, strict=True)]
     return {"axes": axes, "rows": rows[:50_000]}
 

@@ -16,8 +16,10 @@ from pathlib import Path
 from typing import Any
 
 from hil.console.folders import BIN, Folders
+from hil.core.errors import BadInput
 from hil.core.files import RECORD_BYTES, replace_file
 from hil.record import layout
+from hil.record.manifest import read_manifest
 
 _INDEX = "index.json"
 _FORM = 1
@@ -138,11 +140,21 @@ def binned(root: Path) -> list[str]:
     return sorted(file.name.removesuffix(".from") for file in folder.glob("*.from"))
 
 
+def _ended(path: Path) -> dict[str, Any]:
+    """Return how a record ended that says it is running, as far as it can be read."""
+    try:
+        return read_manifest(path).model_dump(include={"outcome", "outcome_detail"})
+    except BadInput:
+        return {}
+
+
 def read_item(path: Path, name: str) -> Item:
     """Return what the list says of a record; one that cannot be read is damaged."""
     try:
         tree = _tree(path / layout.MANIFEST)
         scenario = tree["scenario"] if isinstance(tree["scenario"], dict) else {}
+        if tree.get("outcome", "running") == "running":  # or whoever wrote it is gone
+            tree = {**tree, **_ended(path)}
         outcome = str(tree.get("outcome", "running"))
         failed = _failed(path) if outcome == "complete" else ()
         verdict = outcome if outcome != "complete" else "failed" if failed else "held"

@@ -8,9 +8,14 @@ import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from hil.core.errors import BadInput, HilError, RigFault
+
+try:
+    import fcntl
+except ImportError:  # Windows has none
+    fcntl = None  # type: ignore[assignment]
 
 PART = ".part"  # ends the name of a file in work
 TEXT_BYTES = 4_000_000  # scenarios, robots, laws, mappings: the largest shipped one has 12 KB
@@ -58,6 +63,27 @@ def claim_folder(folder: Path) -> None:
             raise BadInput(f"--out {folder}: the folder is not empty; name a new one")
     except OSError as error:
         raise BadInput(f"--out {folder}: cannot be made: {error.strerror}") from None
+
+
+def hold(file: IO[bytes]) -> None:
+    """Lock an open file for this process, and for what it forks, until it is closed or they are gone.
+
+    Raises OSError where another holds it. Does nothing where the system has no such lock (Windows).
+    """
+    if fcntl is not None:
+        fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def is_left(path: Path) -> bool:
+    """Say whether a file that somebody held (`hold`) is there and nobody holds it any more."""
+    if fcntl is None:
+        return False
+    try:
+        with path.open("rb") as file:
+            fcntl.flock(file.fileno(), fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
 
 
 def unwritable(what: str, error: OSError) -> HilError:

@@ -44,7 +44,9 @@ def finish(keeping: Keeping, ended: Manifest, viewer: ViewerFile | None) -> RunR
     if viewer is not None:
         viewer.write(run)
     keeping.release()
-    return _seal(run)
+    sealed = _seal(run)
+    keeping.leave()
+    return sealed
 
 
 def give_up(keeping: Keeping, ended: Manifest) -> None:
@@ -55,6 +57,7 @@ def give_up(keeping: Keeping, ended: Manifest) -> None:
     keeping.release()
     with suppress(OSError):
         write_manifest(keeping.folder, ended, durable=True)
+    keeping.leave()
 
 
 def _table(folder: Path, journal: str, parquet: str, schema: Sequence[Column]) -> Columns:
@@ -74,7 +77,7 @@ def _seal(run: RunRecord) -> RunRecord:
     files = {
         file.relative_to(run.path).as_posix(): file_entry(file)
         for file in sorted(run.path.rglob("*"))
-        if file.is_file() and file.name != layout.MANIFEST
+        if file.is_file() and file.name not in {layout.MANIFEST, layout.RESERVE}
     }
     manifest = run.manifest.model_copy(update={"files": files})
     write_manifest(run.path, manifest, durable=True)

@@ -1,6 +1,7 @@
 """Names of the files of a run record."""
 
 MANIFEST = "manifest.json"
+RESERVE = ".reserve"  # while the record is being written
 SAMPLES = "samples.parquet"
 SAMPLES_JOURNAL = "samples.journal"
 FRAMES = "frames.parquet"

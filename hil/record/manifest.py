@@ -9,6 +9,7 @@ import platform
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
@@ -25,11 +26,13 @@ from pydantic import (
 
 from hil.core.errors import BadInput
 from hil.core.figures import Better, Metric
-from hil.core.files import RECORD_BYTES, read_bounded, replace_file
+from hil.core.files import RECORD_BYTES, is_left, read_bounded, replace_file
 from hil.core.registry import Entry
 from hil.record import layout
 from hil.record.schema import SAMPLE_COLUMNS, SCHEMA_VERSION, Column
 
+# How a record ends whose process was killed: said by the first command that opens it.
+WRITER_GONE = "the process that wrote it is gone"
 Outcome = Literal["running", "complete", "interrupted", "fault"]
 _PACKAGES = ("skid-steer-hil", "numpy", "opencv-python-headless", "pymavlink", "pyarrow", "scipy")
 
@@ -143,6 +146,9 @@ class Manifest(BaseModel):
     dialect_hash: str = ""
     parameter_hash: str = ""
     firmware_build_id: str = ""
+    signed: bool = Field(
+        False, description="frames were checked with a signing key before they were recorded"
+    )
     open_loop_of: str = Field(
         "", description="the record that answered in place of a robot: the path is not this law's"
     )
@@ -173,6 +179,11 @@ class Manifest(BaseModel):
                 "requirements is no list of tables with metric, and min or max in numbers"
             )
         return tree
+
+    @property
+    def is_cut_off(self) -> bool:
+        """True of a record that is not closed: it is being written, or who wrote it was killed."""
+        return self.outcome == "running" or self.outcome_detail == WRITER_GONE
 
     @property
     def scenario_name(self) -> str:
@@ -232,11 +243,28 @@ def read_manifest(folder: Path) -> Manifest:
             "update skid-steer-hil"
         )
     try:
-        return Manifest.model_validate(tree)
+        manifest = Manifest.model_validate(tree)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         key = ".".join(str(part) for part in first["loc"])
         raise BadInput(f"{path}: damaged: {key}: {first['msg'].lower()}") from None
+    left = manifest.outcome == "running" and is_left(folder / layout.RESERVE)
+    return _end_left(folder, manifest) if left else manifest
+
+
+def _end_left(folder: Path, manifest: Manifest) -> Manifest:
+    """Say in a record that the process which wrote it has gone, unless it has said itself how it ended.
+
+    A folder that cannot be written to stays as it is.
+    """
+    with suppress(OSError, ValueError):
+        if json.loads(read_bounded(folder / layout.MANIFEST, RECORD_BYTES))["outcome"] != "running":
+            return read_manifest(folder)
+    ended = manifest.model_copy(update={"outcome": "fault", "outcome_detail": WRITER_GONE})
+    with suppress(OSError):
+        write_manifest(folder, ended, durable=True)
+        (folder / layout.RESERVE).unlink(missing_ok=True)
+    return ended
 
 
 def file_entry(path: Path) -> FileEntry:

@@ -160,7 +160,7 @@ def read_run(path: Path) -> RunRecord:
     """
     manifest = read_manifest(path)
     problems: list[str] = []
-    if manifest.outcome == "running":
+    if manifest.is_cut_off:
         problems.append("cut off in mid-run: the record was never closed")
     problems += altered_files(path, manifest)
     samples = read_table(path, layout.SAMPLES, layout.SAMPLES_JOURNAL, required=True)

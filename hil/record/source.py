@@ -47,7 +47,7 @@ def read_source(path: Path) -> Source:
     if not (path / layout.TAPE).is_file():
         raise BadInput(f"{path}: has no {layout.TAPE}: recorded without one, nothing to replay")
     problems = altered_files(path, manifest)
-    if manifest.outcome == "running":
+    if manifest.is_cut_off:
         problems.append("cut off in mid-run: the record was never closed")
     tape = read_tape(path / layout.TAPE)
     if not tape.entries:

@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import IO, Self
 
 from hil.core.errors import BadInput, RecordFault
-from hil.core.files import claim_folder
+from hil.core.files import claim_folder, hold
+from hil.record import layout
 
 # Room for the last manifest on a disk that has none left, bytes.
 _RESERVE_BYTES = 65_536
-_RESERVE = ".reserve"
 
 
 class Keeping:
@@ -26,7 +26,8 @@ class Keeping:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._reserve = folder / _RESERVE
+        self._reserve = folder / layout.RESERVE
+        self._held: IO[bytes] | None = None
         self._files: list[GuardedFile] = []
         self.fault: RecordFault | None = None
 
@@ -72,27 +73,42 @@ class Keeping:
         return self.fault
 
     def reserve(self) -> None:
-        """Take the folder for this process and keep space back; raises BadInput, OSError."""
+        """Take the folder for this process and keep space back; raises BadInput, OSError.
+
+        The file of that space is held until `leave`: a reader that finds it and nobody holding it knows that
+        this process has gone.
+        """
         try:
             file = self._reserve.open("xb")
         except FileExistsError:
             raise BadInput(
                 f"--out {self.folder}: another process writes there; name a new one"
             ) from None
-        with file:
-            try:
-                if hasattr(os, "posix_fallocate"):
-                    os.posix_fallocate(file.fileno(), 0, _RESERVE_BYTES)
-                else:
-                    file.write(bytes(_RESERVE_BYTES))
-            except OSError as error:
-                if error.errno == errno.ENOSPC:
-                    raise
+        self._held = file
+        with suppress(OSError):  # a file system without locks
+            hold(file)
+        try:
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(file.fileno(), 0, _RESERVE_BYTES)
+            else:
+                file.write(bytes(_RESERVE_BYTES))
+        except OSError as error:
+            if error.errno == errno.ENOSPC:
+                raise
 
     def release(self) -> None:
         """Give the space kept back to what is written last."""
+        if self._held is not None:
+            with suppress(OSError):
+                self._held.truncate(0)
+
+    def leave(self) -> None:
+        """Give the folder up: its last manifest is written, or cannot be."""
         with suppress(OSError):
             self._reserve.unlink(missing_ok=True)
+        if self._held is not None:
+            with suppress(OSError):
+                self._held.close()
 
     def check(self, file: Path) -> None:
         """Raise RecordFault when a file of the record has gone away."""

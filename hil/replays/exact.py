@@ -158,7 +158,7 @@ def replay(
         ticks_recorded=source.samples["t_s"].size if source.samples else 0,
         ticks_replayed=samples["t_s"].size,
         ending=ending,
-        cut_off=source.manifest.outcome == "running" or rig.ended,
+        cut_off=source.manifest.is_cut_off or rig.ended,
         channels=tuple(_channels(source, samples, record.frames, stamps)),
         problems=source.problems,
         samples=samples,

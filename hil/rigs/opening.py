@@ -12,14 +12,27 @@ if TYPE_CHECKING:
     from hil.config.scenario import Scenario
     from hil.core.registry import Entry
     from hil.core.rig import Rig
+    from hil.wire.signing import Key
 
 REPLAY = "replay:"
 
 
-def open_rig(target: str, scenario: Scenario, camera: str, seed: int) -> Rig:
-    """Return the rig that `target` names, ready to be talked to; raises BadInput or RigFault."""
+def open_rig(
+    target: str,
+    scenario: Scenario,
+    camera: str,
+    seed: int,
+    key: Key | None = None,
+    *,
+    usb: bool = False,
+) -> Rig:
+    """Return the rig that `target` names, ready to be talked to; raises BadInput or RigFault.
+
+    With a `key` what is said to its board is signed and what it says is checked. A simulated board is met on
+    its USB port with `usb`, else on the Bluetooth one.
+    """
     entry = target_entry(target)
-    rig: Rig = entry.factory(Asked(target.partition(":")[2], scenario, camera, seed))
+    rig: Rig = entry.factory(Asked(target.partition(":")[2], scenario, camera, seed, key, usb))
     return rig
 
 

@@ -16,6 +16,9 @@ from hil.config.link import UART_BAUD
 from hil.core.errors import BadInput, RigFault
 from hil.core.rig import PORT_BYTES, ByteStream, Frame, LineBacklog, Truth
 from hil.rigs.frames import FrameSource
+from hil.rigs.key_file import key_of_environment
+from hil.rigs.signed import SignedStream
+from hil.wire.signing import Key
 
 try:
     from termios import error as termios_error
@@ -116,11 +119,24 @@ def _reason(error: Exception) -> str:
 
 
 class SerialRig:
-    """A robot on a serial port and its camera, in real time; nobody knows its true pose."""
+    """A robot on a serial port and its camera, in real time; nobody knows its true pose.
 
-    def __init__(self, device: str, baud: int, camera: FrameSource | None) -> None:
+    `key` is the board's; without one it is that of the environment. Where there is none, or not `signed`,
+    bytes pass as they are.
+    """
+
+    def __init__(
+        self,
+        device: str,
+        baud: int,
+        camera: FrameSource | None,
+        key: Key | None = None,
+        *,
+        signed: bool = True,
+    ) -> None:
+        key = (key or key_of_environment()) if signed else None
         self._port = SerialStream(device, baud)
-        self.stream: ByteStream = self._port
+        self.stream: ByteStream = SignedStream(self._port, key) if key else self._port
         self._camera = camera
 
     def watch_by(self, camera: FrameSource) -> None:

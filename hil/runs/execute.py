@@ -79,7 +79,7 @@ def execute(
     cv2.setNumThreads(1)  # search windows are small: handing them to threads costs more
     parameters, used, manifest = checked(spec)
     law, live = law_and_gains(spec.outer, spec.scenario, live=orders is not None)
-    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
+    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed, spec.key)
     ctrl_c = CtrlC()
     try:
         with ctrl_c:
@@ -106,7 +106,7 @@ def execute(
                 session = Session(
                     spec.scenario, parts, parameters, board_hashes, progress, publish
                 )  # fmt: skip
-                ending, error = _conducted(session, used)
+                ending, error = _conducted(session, ctrl_c, used)
             except KeyboardInterrupt as stop:  # pressed again, while the robot was being stopped
                 ending = Ending("interrupted", str(stop) or "Ctrl-C")
             except Exception as failed:
@@ -124,11 +124,14 @@ def execute(
         rig.close()
 
 
-def _conducted(session: Session, used: Used) -> tuple[Ending, Exception | SystemExit | None]:
+def _conducted(
+    session: Session, ctrl_c: CtrlC, used: Used
+) -> tuple[Ending, Exception | SystemExit | None]:
     """Run the session to its end; return that, and an error of the harness itself that ended it."""
     try:
         ending = session.run()
     except KeyboardInterrupt:
+        ctrl_c.close()  # nothing comes between the robot and its stop
         session.halt()
         raise
     if session.error is None:
@@ -147,7 +150,7 @@ def execute_in_memory(
     """
     parameters, used, manifest = checked(spec)
     law = law or make_law(spec.outer, spec.scenario)
-    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed)
+    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed, spec.key)
     try:
         recorder = MemoryRecorder(manifest)
         parts = make_parts(spec, rig, recorder, law)

@@ -23,6 +23,7 @@ from hil.record.manifest import (
     git_revision,
 )
 from hil.record.schema import SAMPLE_NAMES, TRACE_KEYS
+from hil.rigs.key_file import key_of_environment
 from hil.rigs.opening import REPLAY
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ def make_manifest(spec: RunSpec, parameters: Mapping[str, float], used: Used) ->
         plugins=_from_outside(spec, used),
         trace=trace_terms(law),
         figures=[FigureTerm.of(metric_of(name)) for name in spec.scenario.own_figures],
+        signed=_is_signed(spec),
         open_loop_of=spec.target.removeprefix(REPLAY) if spec.target.startswith(REPLAY) else "",
         notes=notes(spec.scenario),
         versions=collect_versions(),
@@ -77,6 +79,12 @@ def make_manifest(spec: RunSpec, parameters: Mapping[str, float], used: Used) ->
         start_time_utc=datetime.fromtimestamp(now_us * 1e-6, UTC).isoformat(timespec="seconds"),
         start_unix_us=now_us,
     )
+
+
+def _is_signed(spec: RunSpec) -> bool:
+    """Say whether the run's link is signed: by its own key, or on a port by that of the environment."""
+    on_a_port = spec.target.startswith("serial:")
+    return spec.key is not None or (on_a_port and key_of_environment() is not None)
 
 
 def trace_terms(law: Entry) -> list[TraceTerm]:

@@ -14,11 +14,15 @@ from hil.rigs.opening import REPLAY, is_simulated
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
     from hil.record.reader import RunRecord
+    from hil.wire.signing import Key
 
 
 @dataclass(frozen=True, slots=True)
 class RunSpec:
-    """Everything that decides a run; two runs of equal specs on a simulated target are equal."""
+    """Everything that decides a run; two runs of equal specs on a simulated target are equal.
+
+    With a signing `key` the link is signed; nothing of it is recorded.
+    """
 
     scenario: Scenario
     target: str
@@ -31,6 +35,7 @@ class RunSpec:
     small_video: bool = False
     rerun: bool = True
     command: str = ""
+    key: Key | None = None
 
     @property
     def is_simulated(self) -> bool:
@@ -70,4 +75,7 @@ def judged_status(records: Iterable[RunRecord]) -> int:
     As a run's own, the gravest of all; but a record that was stopped by Ctrl-C or cut off has failed
     its requirements (1): this command was not stopped.
     """
-    return max(3 if r.manifest.outcome == "fault" else min(exit_status(r), 1) for r in records)
+    return max(
+        3 if r.manifest.outcome == "fault" and not r.manifest.is_cut_off else min(exit_status(r), 1)
+        for r in records
+    )

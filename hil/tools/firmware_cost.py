@@ -8,15 +8,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from hil.board import _firmware
+from hil.board._firmware import stored_key
 from hil.board.build import FLASH_LIMIT_BYTES, RAM_LIMIT_BYTES, build
 from hil.board.stack_bound import stack_bound
 from hil.config.camera import CameraConfig
 from hil.config.link import LinkConfig
 from hil.config.robot import RobotConfig
 from hil.core.types import Pose
+from hil.rigs.signed import SignedStream
 from hil.tools.frame_cost import FrameCost, measure_frames
 from hil.wire import handshake
 from hil.wire.link import BoardLink
+from hil.wire.signing import BLOCK_BYTES, Key
 from sim_twin.pil import Pil
 from sim_twin.pil_profile import part_map
 from sim_twin.twin import TwinSetup
@@ -57,13 +60,18 @@ class FirmwareCost:
     frames: FrameCost
 
 
-class _Bench:
+class Bench:
     """A board brought up on a plain wire and driven by set-points."""
 
-    def __init__(self, robot: RobotConfig, changes: Mapping[str, float]) -> None:
+    def __init__(self, robot: RobotConfig, changes: Mapping[str, float], key: Key | None) -> None:
         link = LinkConfig(latency_s=0.0, latency_jitter_s=0.0)
-        self.rig = Pil(TwinSetup(robot, link, CameraConfig(), Pose(0.0, 0.0, 0.0), 1))
-        self.link = BoardLink(self.rig.stream)
+        eeprom = stored_key(key.secret, 0) if key else b""
+        setup = TwinSetup(robot, link, CameraConfig(), Pose(0.0, 0.0, 0.0), 1, eeprom=eeprom)
+        rig = self.rig = Pil(setup)
+        stream = (
+            SignedStream(rig.stream, key, lambda: round(1e5 * rig.now_s())) if key else rig.stream
+        )
+        self.link = BoardLink(stream)
         self.last: Any = None  # WHEEL_STATE
         parameters = {entry.name: entry.default for entry in _firmware.parameter_table()}
         parameters["ENC_COUNTS"] = float(robot.encoder_counts_per_turn)
@@ -79,16 +87,17 @@ class _Bench:
         begin_s = self.rig.now_s()
         for step in range(round(seconds / _SETPOINT_S)):
             self.link.send_setpoint(self.rig.now_s(), *speeds(step * _SETPOINT_S))
-            self._listen(begin_s + (step + 1) * _SETPOINT_S)
+            self.listen(begin_s + (step + 1) * _SETPOINT_S)
         after = self.rig.board.usage()
         return 1.0 - (after["asleep"] - before["asleep"]) / (after["cycles"] - before["cycles"])
 
     def stop(self) -> None:
         """Disarm and wait until the robot stands."""
         handshake.finish(self.link, self.rig, handshake.disarm(self.link))
-        self._listen(self.rig.now_s() + 2.0)
+        self.listen(self.rig.now_s() + 2.0)
 
-    def _listen(self, until_s: float) -> None:
+    def listen(self, until_s: float) -> None:
+        """Take what the board says until then."""
         while self.rig.now_s() < until_s:
             self.rig.wait(until_s)
             for report in self.link.poll(self.rig.now_s()):
@@ -100,13 +109,15 @@ def _weaving(t_s: float) -> tuple[float, float]:
     return 6.0 * math.sin(3.0 * t_s) + 0.5 * math.sin(17.0 * t_s), 5.0 * math.cos(2.3 * t_s)
 
 
-def measure(robot: RobotConfig, parameters: Mapping[str, float] | None = None) -> FirmwareCost:
+def measure(
+    robot: RobotConfig, parameters: Mapping[str, float] | None = None, key: Key | None = None
+) -> FirmwareCost:
     """Drive the processor in the loop and look at what it did; takes a few seconds of wall time.
 
-    `parameters` are board parameters that differ from their defaults.
+    `parameters` are board parameters that differ from their defaults, `key` is a signing key set on it.
     """
     made, changes = build(), parameters or {}
-    bench, parts = _Bench(robot, changes), part_map(made)
+    bench, parts = Bench(robot, changes, key), part_map(made)
     board = bench.rig.board
     awake_ratio = bench.drive(3.0, _weaving)
     board.start_profile(parts.part_of_word)
@@ -116,8 +127,8 @@ def measure(robot: RobotConfig, parameters: Mapping[str, float] | None = None) -
     share = {name: count / CLOCK_HZ for name, count in zip(parts.names, by_part, strict=True)}
     interrupts = board.usage()["interrupts"]
     longest_tick_us = 1e-3 * bench.link.sys_status.load * _firmware.TICK_US
-    frames = measure_frames(bench.rig, bench.link)
-    full, awake_full_ratio = _full_encoders(robot, changes)
+    frames = measure_frames(bench.rig, bench.link, BLOCK_BYTES if key else 0)
+    full, awake_full_ratio = _full_encoders(robot, changes, key)
     counted = (full.last.left_counts, full.last.right_counts)
     return FirmwareCost(
         flash_bytes=made.flash_bytes,
@@ -136,11 +147,13 @@ def measure(robot: RobotConfig, parameters: Mapping[str, float] | None = None) -
     )
 
 
-def _full_encoders(robot: RobotConfig, changes: Mapping[str, float]) -> tuple[_Bench, float]:
+def _full_encoders(
+    robot: RobotConfig, changes: Mapping[str, float], key: Key | None
+) -> tuple[Bench, float]:
     """Run with finer encoders, 8,000 edges a second at 10 rad/s; return bench and share awake."""
     counts_per_turn = round(FULL_EDGES_1_S * math.tau / _FULL_SPEED_RAD_S)
     fine = robot.model_copy(update={"encoder_counts_per_turn": counts_per_turn})
-    bench = _Bench(fine, changes)
+    bench = Bench(fine, changes, key)
     straight = (_FULL_SPEED_RAD_S, _FULL_SPEED_RAD_S)
     bench.drive(1.0, lambda _: straight)
     awake_ratio = bench.drive(2.0, lambda _: straight)

@@ -16,8 +16,8 @@ from hil.wire.messages import set_parameter_message
 from sim_twin.pil import Pil
 
 _RATE_HZ = 20
-# What 57,600 baud carry of a PARAM_SET of 37 bytes.
-_FLOOD_HZ = 155
+# What 57,600 baud carry; a PARAM_SET has 37 bytes without its signature.
+_LINE_BYTES_S, _SET_BYTES = 5_760, 37
 _STEP_S = 1.0 / 30.0
 _SPEED_RAD_S = 5.0
 
@@ -112,8 +112,11 @@ class _Flooded:
                 self.latest_us = max(self.latest_us, report.wire.t_mcu_us % _firmware.TICK_US)
 
 
-def measure_frames(rig: Pil, link: BoardLink) -> FrameCost:
-    """Measure on a board that is armed; leaves it disarmed with the defaults in force."""
+def measure_frames(rig: Pil, link: BoardLink, block_bytes: int = 0) -> FrameCost:
+    """Measure on a board that is armed; leaves it disarmed with the defaults in force.
+
+    `block_bytes` come with every frame for its signature.
+    """
     bench = _Flooded(rig, link)
     bench.drive(1.0)
     alone_s = bench.drive(1.0)
@@ -121,7 +124,8 @@ def measure_frames(rig: Pil, link: BoardLink) -> FrameCost:
         name: 1e6 * (bench.drive(1.0, say) - alone_s) / _RATE_HZ for name, say in _kinds().items()
     }
     before = bench.counts()
-    bench.drive(2.0, _set("PID_KD", 0.00003, 0.00001), _FLOOD_HZ)
+    flood_hz = _LINE_BYTES_S // (_SET_BYTES + block_bytes)
+    bench.drive(2.0, _set("PID_KD", 0.00003, 0.00001), flood_hz)
     bench.counts()  # what is still on the line comes in meanwhile
     handshake.finish(link, rig, handshake.disarm(link))
     storage = dialect.MAV_CMD_PREFLIGHT_STORAGE

@@ -25,6 +25,7 @@ from hil.rigs.frames import encode_frame
 from hil.tools.serve_names import PortName, bind_socket, release_socket
 from hil.wire import dialect
 from hil.wire.framing import FrameReader
+from hil.wire.signing import FrameCutter
 
 if TYPE_CHECKING:
     from hil.core.rig import Frame, Rig
@@ -179,6 +180,7 @@ class TwinServer:
             self.port.close()
             raise
         self._listening = False
+        self._cutter = FrameCutter()
         self._watcher = FrameReader()
         self._armed = False
         self._clock = FollowedClock(rig.now_s() - time.monotonic())
@@ -235,7 +237,8 @@ class TwinServer:
 
     def _watch(self, data: bytes) -> None:
         """Let the scenario's timed events begin when the board is armed."""
-        for msg_id, message, _ in self._watcher.feed(data):
+        bare = b"".join(cut.frame for cut in self._cutter.feed(data))
+        for msg_id, message, _ in self._watcher.feed(bare):
             if msg_id == dialect.MAVLINK_MSG_ID_WHEEL_STATE:
                 armed = message.state == dialect.HIL_STATE_ARMED
                 if armed and not self._armed:

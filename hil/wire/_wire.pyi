@@ -3,6 +3,9 @@ from collections.abc import Callable
 from hil.core._native import BoardClock
 from hil.core.types import WheelSample
 
+def checksum(data: bytes, extra: int) -> int:
+    """Return CRC-16/MCRF4XX of some bytes and one more."""
+
 class WheelState:
     """A WHEEL_STATE; its fields, units in their names: hil/wire/hil.xml."""
 
@@ -41,6 +44,7 @@ class ReadCounters:
     bad_crc: int
     skipped_bytes: int
     foreign: int
+    signed_frames: int
 
 class FrameReader:
     counters: ReadCounters

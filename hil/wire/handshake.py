@@ -19,6 +19,8 @@ from hil.wire.messages import arming_params, set_parameter_message
 
 # Opening the port of an Arduino resets it; its boot loader holds it for up to 2 s.
 _FIRST_HEARTBEAT_S = 6.0
+# Frames of a board that signs, a second's.
+_SIGNED_MOST = 50
 _REPLY_S = 0.5
 _TRIES = 10
 # A save takes the board 0.86 s, a byte a tick.
@@ -48,7 +50,7 @@ def connect(link: BoardLink, parameters: Mapping[str, float]) -> Procedure:
 
     Raises RigFault when none answers, or it speaks another dialect.
     """
-    if not (yield from _wait(link, lambda: link.heartbeats > 0, _FIRST_HEARTBEAT_S)):
+    if not (yield from _wait(link, lambda: _hears(link), _FIRST_HEARTBEAT_S)):
         raise RigFault(
             f"board: no heartbeat within {_FIRST_HEARTBEAT_S:.0f} s "
             f"({link.counters.skipped_bytes} bytes that were no frame); is it powered, is the "
@@ -63,6 +65,16 @@ def connect(link: BoardLink, parameters: Mapping[str, float]) -> Procedure:
     for name, value in parameters.items():
         yield from set_parameter(link, name, value)
     yield from read_info(link)  # with the parameter hash as it now is
+
+
+def _hears(link: BoardLink) -> bool:
+    """Say whether the board was heard; RigFault where it signs what it says and nothing checks that."""
+    if link.heartbeats == 0 and link.counters.signed_frames >= _SIGNED_MOST:
+        raise RigFault(
+            "board: signs what it says, so it has a key, and this host was given none; name its file: "
+            "hil run --key FILE, or HIL_KEY=FILE"
+        )
+    return link.heartbeats > 0
 
 
 def _check_dialect(link: BoardLink) -> None:

@@ -15,12 +15,14 @@ _PARAMETER = struct.Struct("<16sf")
 def dialect_hash() -> int:
     """Return CRC-32 over (message id, CRC_EXTRA, payload length) in order of message id.
 
-    CRC_EXTRA covers names and types of message and fields; ids and lengths cover the rest.
+    CRC_EXTRA covers names and types of message and fields; ids and lengths cover the rest. SETUP_SIGNING
+    is left out: who never sets a key need not know it.
     """
     return zlib.crc32(
         b"".join(
             _ENTRY.pack(msg_id, message.crc_extra, message.unpacker.size)
             for msg_id, message in sorted(dialect.mavlink_map.items())
+            if msg_id != dialect.MAVLINK_MSG_ID_SETUP_SIGNING
         )
     )
 

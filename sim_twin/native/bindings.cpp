@@ -136,8 +136,10 @@ nb::list kernel_sent(Kernel& k) {
 using BoardPointer = std::shared_ptr<twin::BoardSide>;
 constexpr char kBoardHandle[] = "twin::BoardSide";
 
-nb::capsule host_board(double clock_ppm, std::uint32_t clock_start_us, double baud) {
-  const twin::HostBoardOptions options{clock_ppm, clock_start_us, 10e6 / baud};
+nb::capsule host_board(double clock_ppm, std::uint32_t clock_start_us, double baud, bool wired,
+                       const nb::bytes& eeprom) {
+  const twin::HostBoardOptions options{clock_ppm, clock_start_us, 10e6 / baud, wired,
+                                       std::string(eeprom.c_str(), eeprom.size())};
   return nb::capsule(new BoardPointer(std::make_shared<twin::HostBoard>(options)), kBoardHandle,
                      [](void* p) noexcept { delete static_cast<BoardPointer*>(p); });
 }
@@ -185,7 +187,8 @@ void bind_kernel(nb::module_& m) {
             return out;
           },
           "angle_rad"_a, "t0_us"_a, "h_us"_a, "dead_a"_a = false, "dead_b"_a = false, "swapped"_a = false);
-  m.def("host_board", &host_board, "clock_ppm"_a, "clock_start_us"_a, "baud"_a);
+  m.def("host_board", &host_board, "clock_ppm"_a, "clock_start_us"_a, "baud"_a, "wired"_a = false,
+        "eeprom"_a = nb::bytes("", 0));
   nb::class_<Kernel>(m, "Kernel")
       .def("__init__", &make_kernel, "params"_a, "step_us"_a, "counts_per_turn"_a, "board"_a)
       .def("reset", &Kernel::reset, "x_m"_a, "y_m"_a, "theta_rad"_a)

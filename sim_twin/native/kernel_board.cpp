@@ -16,7 +16,18 @@ void read_bytes(void* storage, std::uint16_t address, std::uint8_t* out, std::ui
   std::copy_n(static_cast<const std::uint8_t*>(storage) + address, n, out);
 }
 
+// The time that signatures take the processor is not the twin's: the processor in the loop has it.
+void hash_all(hil::Board& board) {
+  while (hil::board_idle(board)) {
+  }
+}
+
 }  // namespace
+
+HostBoard::HostBoard(const HostBoardOptions& options)
+    : options_(options), eeprom_(hil::BOARD_STORAGE_SIZE, 0xFF) {
+  std::copy_n(options.eeprom.begin(), std::min(options.eeprom.size(), eeprom_.size()), eeprom_.begin());
+}
 
 std::uint32_t HostBoard::clock_us(double t_us) const {
   const double own_us = (t_us - boot_us_) * (1.0 + 1e-6 * options_.clock_ppm);
@@ -48,6 +59,7 @@ void HostBoard::set_reset(bool held, std::int64_t t_us, const std::uint8_t pins[
   edges_done_ = 0;
   hil::board_init(board_);
   hil::board_load(board_, read_bytes, eeprom_.data());
+  board_.wired = options_.wired;
   for (int side = 0; side < 2; ++side) encoder_[side] = hil::Quadrature{pins[side], 0, 0};
 }
 
@@ -68,6 +80,7 @@ void HostBoard::catch_up(double t_us) {
       for (std::size_t at = 0; at < chunk.bytes.size();) {
         const auto left = static_cast<std::uint16_t>(std::min<std::size_t>(chunk.bytes.size() - at, 0xFFFF));
         at += hil::board_receive(board_, bytes + at, left, clock_us(at_us));
+        hash_all(board_);
       }
       transmit(at_us);
     }
@@ -101,6 +114,7 @@ void HostBoard::tick(double t_us, double battery_v) {
   hil::StoredByte byte{};
   if (hil::board_store(board_, byte)) eeprom_[byte.address] = byte.value;
   hil::board_slack(board_);
+  hash_all(board_);
   transmit(t_us);
 }
 

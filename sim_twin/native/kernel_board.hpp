@@ -48,11 +48,13 @@ struct HostBoardOptions {
   double clock_ppm = 0.0;            // board clock fast against true time
   std::uint32_t clock_start_us = 0;  // board clock when the run begins
   double byte_us = 10e6 / 57600.0;   // UART time of one byte
+  bool wired = false;                // the host is on the USB port, else on the Bluetooth one
+  std::string eeprom;                // first bytes of it; the rest is as it comes new
 };
 
 class HostBoard final : public BoardSide {
  public:
-  explicit HostBoard(const HostBoardOptions& options) : options_(options), eeprom_(hil::STORAGE_SIZE, 0xFF) {}
+  explicit HostBoard(const HostBoardOptions& options);
   void set_reset(bool held, std::int64_t t_us, const std::uint8_t pins[2]) override;
   void edge(const PinEdge& edge) override { edges_.push_back(edge); }
   void receive(std::int64_t t_us, std::string bytes) override;
@@ -77,7 +79,7 @@ class HostBoard final : public BoardSide {
   std::vector<PinEdge> edges_;
   std::size_t edges_done_ = 0;
   std::deque<Chunk> received_;
-  std::vector<std::uint8_t> eeprom_;  // as it comes new; keeps what it holds through a reset
+  std::vector<std::uint8_t> eeprom_;  // keeps what it holds through a reset
   bool held_ = true;
   double boot_us_ = 0.0;  // true time at which the board's clock showed clock_boot_us_
   std::uint32_t clock_boot_us_ = 0;

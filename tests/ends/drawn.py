@@ -261,7 +261,7 @@ def _flaws_of(record: Path, kind: str, status: int) -> list[str]:
         torn = kind == "folder gone" or (kind == "SIGKILL" and "cut off before" in str(error))
         return [] if torn else [f"not readable: {error}"]
     flaws = []
-    if run.manifest.outcome == "running" and kind != "SIGKILL":
+    if run.manifest.outcome == "running":
         flaws.append("the outcome is still running")
     leavings = list(record.glob("*.part")) or (record / ".reserve").exists()
     if leavings and kind not in {"SIGKILL", "folder gone"}:

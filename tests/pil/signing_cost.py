@@ -1,17 +1,17 @@
-"""What MAVLink's signature would cost the board: cycles of SHA-256 on the processor, under simavr.
+"""What the core's SHA-256 costs the board, and that it is SHA-256 there: run under simavr by itself.
 
-`python -m tests.pil.signing_cost` prints cycles and time of one signed WHEEL_SETPOINT and WHEEL_STATE, and
-the share of the processor at their rates: by the code that mavgen brings along, and by one written for
-eight bits (tests/pil/sha256_eight_bits.h). docs/firmware.md has the figures.
+`python -m tests.pil.signing_cost` prints the cycles of a block, and what signatures take at the link's rates.
 """
 
 from __future__ import annotations
 
 import hashlib
+import random
 import re
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,28 +19,17 @@ from hil.board.build import find_toolchain, sketch_folder
 from hil.wire import dialect
 
 CLOCK_HZ = 16_000_000
-# The secret key, then header, CRC, link id and time stamp are hashed with the payload; set-points come at
-# 30 Hz, reports at 50.
-KEY_BYTES, _OVERHEAD_BYTES = 32, 10 + 2 + 1 + 6
 RATES_HZ = {"WHEEL_SETPOINT": 30, "WHEEL_STATE": 50}
+# Key, header, CRC, link id and time stamp are hashed with the payload; the digest's padding takes nine bytes.
+_OVERHEAD_BYTES = 32 + 10 + 2 + 1 + 6
 _BLOCK_BYTES, _PADDING_BYTES = 64, 9
-# What is hashed: the bytes 0, 1, 2, ... padded to one block; the first word of its digest is said too.
-_SAMPLE_BYTES = 55
+_SOURCES = ("sha256.cpp", "sha256.h", "sha256_avr.S", "flash.h")
 _PROGRAM = """
-#include <avr/interrupt.h>
 #include <avr/io.h>
-#include <avr/pgmspace.h>
+#include <avr/interrupt.h>
 #include <avr/sleep.h>
-#include <stdbool.h>
-#include <stdint.h>
-#include <string.h>
-#define MAVLINK_HELPER static
-#define KWHERE PROGMEM
-#define KLOAD(p) pgm_read_dword(p)
-#include "mavlink_sha256.h"
-#undef R8
-#include "sha256_eight_bits.h"
-volatile uint8_t message[128], signature[6];
+#include "sha256.h"
+const uint8_t texts[][128] PROGMEM = {TEXTS};
 static void put(char c) { while (!(UCSR0A & (1 << UDRE0))) {} UDR0 = c; }
 static void say(uint32_t v) {
   char digits[12]; int n = 0;
@@ -49,38 +38,32 @@ static void say(uint32_t v) {
   while (n) put(digits[--n]);
   put('\\n');
 }
-static uint32_t cycles_of(uint16_t bytes) {
-  static mavlink_sha256_ctx ctx;
-  uint8_t key[32], out[6];
-  memset(key, 7, sizeof key);
-  TCNT1 = 0;
-  TCCR1B = 2;  // a count is 8 cycles
-  mavlink_sha256_init(&ctx);
-  mavlink_sha256_update(&ctx, key, 32);
-  mavlink_sha256_update(&ctx, (const void *)message, bytes);
-  mavlink_sha256_final_48(&ctx, out);
-  memcpy((void *)signature, out, 6);
-  return 8UL * TCNT1;
-}
-static uint32_t state[8] = {0x6a09e667, 0xbb67ae85, 0x3c6ef372, 0xa54ff53a,
-                            0x510e527f, 0x9b05688c, 0x1f83d9ab, 0x5be0cd19};
-static uint32_t cycles_of_block(void) {
-  static uint8_t block[64];
-  for (uint8_t i = 0; i < SAMPLE; ++i) block[i] = i;
-  block[SAMPLE] = 0x80;
-  block[62] = SAMPLE * 8 / 256;
-  block[63] = SAMPLE * 8 % 256;
-  TCNT1 = 0;
-  TCCR1B = 2;
-  take_block(state, block);
-  return 8UL * TCNT1;
-}
-int main(void) {
+static hil::Sha256 sha;
+static uint8_t text[128];
+int main() {
   UBRR0 = 0;
   UCSR0B = 1 << TXEN0;
-  SAY
-  say(cycles_of_block());
-  say(state[0]);
+  for (uint8_t i = 0; i < sizeof(texts) / 128; ++i) {
+    memcpy_P(text, texts[i], 128);
+    hil::sha256_init(sha);
+    uint32_t cycles = 0, slice = 0;
+    for (uint8_t block = 0; block < 2; ++block) {
+      TCCR1B = 0; TCNT1 = 0; TCCR1B = 1;
+      hil::sha256_words(sha, 0, text + 64 * block, 16);
+      hil::sha256_begin(sha);
+      cycles += TCNT1;
+      for (bool done = false; !done;) {
+        TCNT1 = 0;
+        done = hil::sha256_slice(sha);
+        const uint16_t took = TCNT1;
+        cycles += took;
+        if (took > slice) slice = took;
+      }
+    }
+    say(cycles / 2);
+    say(slice);
+    for (uint8_t k = 0; k < 8; ++k) say(sha.h[k]);
+  }
   cli();
   sleep_enable();
   sleep_cpu();
@@ -91,70 +74,72 @@ int main(void) {
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """Cycles of one signature by message, by mavgen's code, and of one block by the one for eight bits."""
+    """Cycles of a block, and of its longest slice; `digests` are what the processor made of the texts."""
 
-    mavgen: dict[str, int]
     block: int
+    slice: int
+    digests: tuple[bytes, ...]
 
-    def eight_bits(self) -> dict[str, int]:
-        """Return the cycles of one signature by message: of its blocks alone."""
-        return {name: self.block * blocks for name, blocks in _blocks().items()}
-
-
-def _sizes() -> dict[str, int]:
-    """Return what of each message is hashed after the key, with the whole payload, in bytes."""
-    return {
-        name: _OVERHEAD_BYTES + getattr(dialect, f"MAVLink_{name.lower()}_message").unpacker.size
-        for name in RATES_HZ
-    }
+    def signature(self, name: str) -> int:
+        """Return the cycles that the blocks of a signed message take, without the key's eight rounds."""
+        size = getattr(dialect, f"MAVLink_{name.lower()}_message").unpacker.size
+        blocks = -(-(_OVERHEAD_BYTES + size + _PADDING_BYTES) // _BLOCK_BYTES)
+        return self.block * blocks - self.block * 8 // 64
 
 
-def _blocks() -> dict[str, int]:
-    whole = {name: KEY_BYTES + size + _PADDING_BYTES for name, size in _sizes().items()}
-    return {name: -(-size // _BLOCK_BYTES) for name, size in whole.items()}
+def texts_drawn(count: int) -> list[bytes]:
+    """Return texts whose padding ends in the second block: drawn, and the longest and shortest of them."""
+    rng = random.Random(1)
+    sizes = [56, 119, *(rng.randint(56, 119) for _ in range(count - 2))]
+    return [rng.randbytes(size) for size in sizes]
 
 
-def measure() -> Cost:
-    """Run both on the processor; raises ValueError where the digest is not SHA-256's."""
-    sizes = _sizes()
-    header = (sketch_folder() / "src/mavlink/mavlink_sha256.h").read_text()
-    with tempfile.TemporaryDirectory() as text:
-        folder = Path(text)
-        (folder / "mavlink_sha256.h").write_text(header.replace('#include "mavlink_types.h"', ""))
-        shutil.copy(Path(__file__).with_name("sha256_eight_bits.h"), folder)
-        says = " ".join(f"say(cycles_of({size}));" for size in sizes.values())
-        program = _PROGRAM.replace("SAY", says).replace("SAMPLE", str(_SAMPLE_BYTES))
-        (folder / "sign.c").write_text(program)
-        compiler = [
-            find_toolchain().tool("gcc"),
-            "-mmcu=atmega2560",
-            "-DF_CPU=16000000L",
-            "-Os",
-            "-w",
-        ]
-        subprocess.run([*compiler, "sign.c", "-o", "sign.elf"], cwd=folder, check=True)
-        simavr = shutil.which("simavr") or "simavr"
+def _padded(text: bytes) -> bytes:
+    return text + b"\x80" + bytes(128 - 9 - len(text)) + (8 * len(text)).to_bytes(8, "big")
+
+
+def measure(texts: Sequence[bytes], first_word: str = "") -> Cost:
+    """Run the core's code on the processor; `first_word` takes the place of the first of its constants."""
+    folder_of_core = sketch_folder() / "src/core"
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for source in _SOURCES:
+            shutil.copy(folder_of_core / source, folder)
+        if first_word:
+            code = (folder / "sha256.cpp").read_text()
+            (folder / "sha256.cpp").write_text(code.replace("0x428a2f98", first_word))
+        rows = ",".join("{" + ",".join(map(str, _padded(text))) + "}" for text in texts)
+        (folder / "main.cpp").write_text(
+            "#include <avr/pgmspace.h>\n" + _PROGRAM.replace("TEXTS", rows)
+        )
+        files = ["main.cpp", "sha256.cpp", "sha256_avr.S"]
+        compiler = [find_toolchain().tool("gcc"), "-mmcu=atmega2560", "-std=gnu++11", "-Os", "-w"]
+        subprocess.run([*compiler, *files, "-o", "hash.elf"], cwd=folder, check=True)
         done = subprocess.run(
-            [simavr, "-m", "atmega2560", "-f", str(CLOCK_HZ), "sign.elf"],
+            ["simavr", "-m", "atmega2560", "-f", str(CLOCK_HZ), "hash.elf"],
             cwd=folder, capture_output=True, text=True, check=True, timeout=60,
         )  # fmt: skip
-    *mavgen, block, word = (int(text) for text in re.findall(r"=(\d+)", done.stdout + done.stderr))
-    wanted = hashlib.sha256(bytes(range(_SAMPLE_BYTES))).digest()[:4]
-    if word != int.from_bytes(wanted, "big"):
-        raise ValueError(f"the digest begins with {word:08x}, SHA-256's with {wanted.hex()}")
-    return Cost(dict(zip(sizes, mavgen, strict=True)), block)
+    said = [int(text) for text in re.findall(r"=(\d+)", done.stdout + done.stderr)]
+    rows_said = [said[at : at + 10] for at in range(0, len(said), 10)]
+    digests = tuple(b"".join(w.to_bytes(4, "big") for w in row[2:]) for row in rows_said)
+    return Cost(max(row[0] for row in rows_said), max(row[1] for row in rows_said), digests)
+
+
+def expected(texts: Sequence[bytes]) -> tuple[bytes, ...]:
+    """Return the digests by hashlib."""
+    return tuple(hashlib.sha256(text).digest() for text in texts)
 
 
 def main() -> None:
-    """Print the table."""
-    cost = measure()
-    for code, found in (("mavgen's", cost.mavgen), ("for eight bits", cost.eight_bits())):
-        for name, cycles in found.items():
-            share = cycles * RATES_HZ[name] / CLOCK_HZ
-            print(
-                f"{code}: {name}: {cycles} cycles, {1e3 * cycles / CLOCK_HZ:.1f} ms, {share:.1%} of the "
-                f"processor at {RATES_HZ[name]} Hz"
-            )
+    """Print what a block and a signature take."""
+    cost = measure(texts_drawn(4))
+    print(f"a block: {cost.block} cycles, its longest slice {cost.slice}")
+    for name, rate_hz in RATES_HZ.items():
+        cycles = cost.signature(name)
+        share = cycles * rate_hz / CLOCK_HZ
+        print(
+            f"{name}: {cycles} cycles, {1e3 * cycles / CLOCK_HZ:.1f} ms, {share:.1%} at {rate_hz} Hz"
+        )
 
 
 if __name__ == "__main__":

@@ -4,7 +4,9 @@ import pytest
 
 from hil.board.build import FLASH_LIMIT_BYTES, RAM_LIMIT_BYTES
 from hil.board.stack_bound import RAM_BYTES
-from hil.tools.firmware_cost import CLOCK_HZ, TICKS_PER_S, measure
+from hil.tools.firmware_cost import CLOCK_HZ, TICKS_PER_S, Bench, measure
+from hil.wire import dialect
+from hil.wire.signing import Key
 from tests.pil.rigs import needs_toolchain
 from tests.twin.rigs import robot
 
@@ -86,3 +88,61 @@ def test_the_implicit_wheel_law_costs_less_than_the_default_one(cost):
     control = "tick: control"
     assert implicit.cycles_per_tick[control] < 0.85 * cost.cycles_per_tick[control]
     assert 0.1 < implicit.tick_and_link_ratio <= MARGIN * 0.40
+
+
+@pytest.fixture
+def signed_bench():
+    """Return a board with a key, armed, and its host."""
+    return Bench(robot(), {}, Key(bytes(range(1, 33)), "key"))
+
+
+def _status(bench):
+    """Return the board's next account of what it lost, while set-points keep it armed."""
+    bench.link.forget_sys_status()
+    while bench.link.sys_status is None:
+        bench.drive(0.1, lambda _: (3.0, 3.0))
+    return bench.link.sys_status
+
+
+@pytest.fixture(scope="module")
+def signed():
+    """Return the cost with a signing key: every frame of both sides signed."""
+    return measure(robot(), key=Key(bytes(range(1, 33)), "key"))
+
+
+def test_signing_leaves_tick_and_link_their_budget(signed, cost):
+    """Longer frames both ways; the hashing itself is done between ticks, when nothing else is to do."""
+    assert cost.tick_and_link_ratio < signed.tick_and_link_ratio <= 0.40, signed.cycles_per_tick
+    assert cost.cycles_per_tick["signing"] < 100
+    assert 10_000 < signed.cycles_per_tick["signing"] < 18_000
+    assert signed.awake_ratio < 0.75
+
+
+def test_signing_makes_no_tick_late(signed):
+    """Under floods of signed frames at line rate, which are more than can be checked, too."""
+    assert signed.frames.overruns == 0
+    assert 0 < signed.frames.latest_us <= MARGIN * 1000
+    assert signed.frames.latest_us + signed.longest_tick_us <= 0.75 * 4000
+
+
+def test_a_signed_session_loses_no_frame(signed_bench):
+    """Set-points at 100 Hz beside reports at 50, all signed: none lost, refused or dropped, no tick late."""
+    link, rig = signed_bench.link, signed_bench.rig
+    _status(signed_bench)
+    begin_s = rig.now_s()
+    for count in range(200):
+        link.send_setpoint(rig.now_s(), 3.0, 3.0)
+        signed_bench.listen(begin_s + (count + 1) / 100)
+    after = _status(signed_bench)
+    lost = (after.errors_comm, after.errors_count1, after.errors_count2, after.errors_count3)
+    assert lost == (0, 0, 0, 0)
+    assert after.errors_count4 == 0
+    assert signed_bench.last.state == dialect.HIL_STATE_ARMED
+
+
+def test_signing_loses_no_edge_and_keeps_the_stack(signed):
+    """8,000 edges a second on both wheels, every frame signed: all counted, and time left over."""
+    assert signed.edges_lost == 0
+    assert signed.awake_full_ratio < 0.80
+    assert signed.interrupts_off_cycles <= INTERRUPTS_OFF_CYCLES
+    assert signed.stack_bytes <= signed.stack_bound_bytes

@@ -55,11 +55,13 @@ def test_compiles_in_the_way_of_the_arduino_ide(tmp_path):
         made = []
         for path in sources:
             target = tmp_path / f"{name}-{len(made)}.o"
-            language = ["-x", "c++"] if path.suffix == ".ino" else []
-            cxx = [] if path.suffix == ".c" else [*build._CXX]
+            language = {".ino": ["-x", "c++"], ".S": ["-x", "assembler-with-cpp"]}.get(
+                path.suffix, []
+            )
+            cxx = [] if path.suffix in {".c", ".S"} else [*build._CXX]
             # avr-gcc 5.4 does not define what Debian's copy of WString.cpp asks for.
             digits = ["-DDECIMAL_DIG=17"] if name == "core" else []
-            tool = tools.tool("gcc" if path.suffix == ".c" else "g++")
+            tool = tools.tool("gcc" if path.suffix in {".c", ".S"} else "g++")
             command = [
                 tool,
                 *flags,
@@ -79,7 +81,7 @@ def test_compiles_in_the_way_of_the_arduino_ide(tmp_path):
     core = [p for p in (tools.core / "cores/arduino").iterdir() if p.suffix in {".c", ".cpp"}]
     archive = str(tmp_path / "core.a")
     subprocess.run([tools.tool("gcc-ar"), "rcs", archive, *compile_all(core, "core")], check=True)
-    own = [p for p in build._sketch_sources(sketch) if p.suffix in {".ino", ".cpp", ".c"}]
+    own = [p for p in build._sketch_sources(sketch) if p.suffix in {".ino", ".cpp", ".c", ".S"}]
     elf = tmp_path / "ide.elf"
     link = ["-w", "-fuse-linker-plugin", "-Wl,--gc-sections", "-o", str(elf)]
     command = [

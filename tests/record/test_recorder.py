@@ -20,7 +20,7 @@ import pytest
 from hil.core.errors import BadInput
 from hil.core.types import OuterCommand
 from hil.record.layout import FRAMES_JOURNAL, SAMPLES_JOURNAL
-from hil.record.manifest import read_manifest
+from hil.record.manifest import WRITER_GONE, read_manifest
 from hil.record.reader import picture_name, read_pictures, read_run
 from hil.record.recorder import Recorder
 from hil.record.schema import FRAME_NAMES, SAMPLE_COLUMNS, SAMPLE_NAMES, TRACE_KEYS
@@ -154,8 +154,52 @@ def test_killed_process_leaves_its_rows(tmp_path):
     t_s = run.samples["t_s"]
     assert t_s.size >= 3000 - 30
     np.testing.assert_array_equal(t_s, np.arange(t_s.size) / 30)
-    assert run.manifest.outcome == "running"
+    assert (run.manifest.outcome, run.manifest.outcome_detail) == ("fault", WRITER_GONE)
+    assert read_manifest(tmp_path / "run") == run.manifest
     assert "cut off" in run.problems[0]
+
+
+FORKED = """
+import os, pathlib, sys, time
+from hil.record.recorder import Recorder
+from tests.record.synthetic import manifest
+recorder = Recorder(pathlib.Path(sys.argv[1]), manifest())
+child = os.fork()
+if child:
+    print(child, flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+def test_a_record_is_not_given_up_while_a_process_of_its_writer_lives(tmp_path):
+    """What the killed process had forked may still write: running until that is gone as well."""
+    command = [sys.executable, "-c", FORKED, str(tmp_path / "run")]
+    root = Path(__file__).resolve().parents[2]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=root) as process:
+        child = int(process.stdout.readline())
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        assert read_manifest(tmp_path / "run").outcome == "running"
+        os.kill(child, signal.SIGKILL)
+        process.stdout.read()  # its end of the pipe is closed: it is gone
+    assert read_manifest(tmp_path / "run").outcome_detail == WRITER_GONE
+
+
+def test_a_record_that_is_being_written_is_running_whoever_looks(tmp_path):
+    """Looked at by this process and another, it says so; closed, it says how it ended, and holds no lock."""
+    recorder = Recorder(tmp_path / "run", manifest())
+    look = (
+        "import sys; from pathlib import Path; from hil.record.manifest import read_manifest; "
+        "print(read_manifest(Path(sys.argv[1])).outcome)"
+    )
+    command = [sys.executable, "-c", look, str(tmp_path / "run")]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    assert said == read_manifest(tmp_path / "run").outcome == "running"
+    recorder.close("complete")
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    assert said == "complete"
+    assert not (tmp_path / "run" / ".reserve").exists()
 
 
 def test_altered_file_is_recognised(tmp_path):

@@ -10,14 +10,17 @@ import sys
 from pathlib import Path
 from random import Random
 
+import pyarrow.parquet as pq
 import pytest
 from pydantic import ValidationError
 
 from hil.config.load import builtin_names
 from hil.core.errors import BadInput
 from hil.study.campaign.axes import Distribution, Range
+from hil.study.campaign.findings import outcomes_of
 from hil.study.campaign.plan import ROW_COLUMNS, Campaign, load_campaign
 from hil.study.campaign.results import schema_of
+from hil.study.campaign.work import run_campaign
 
 
 def campaign(folder: Path, text: str) -> Campaign:
@@ -176,12 +179,32 @@ def test_bounded_normal_is_drawn_again_and_not_piled_up() -> None:
         Distribution(kind="normal", mean=0.0, sd=0.1, low=1.0)
 
 
+def test_the_length_of_a_run_is_varied_beside_the_figure_of_its_name(tmp_path: Path) -> None:
+    """What was asked has a column of its own; the figure says how long each run lasted."""
+    file = tmp_path / "lengths.toml"
+    file.write_text(
+        'scenario = "scenario-1"\ncamera = "pose"\nouter = ["pid", "asg-ism"]\nfigures = ["iae_m_s"]\n'
+        "[grid]\nduration_s = [0.5, 1.0]\n"
+    )
+    campaign = load_campaign(str(file))
+    run_campaign(campaign, tmp_path / "out", workers=1)
+    table = pq.read_table(tmp_path / "out" / "results.parquet")
+    assert table.column("scenario.duration_s").to_pylist() == [0.5, 0.5, 1.0, 1.0]
+    assert table.column("duration_s").to_pylist() == pytest.approx([0.5, 0.5, 1.0, 1.0])
+    stations = outcomes_of(campaign, table).stations("duration_s")
+    assert [station.value for station in stations] == [0.5, 1.0]
+
+
 @pytest.mark.parametrize(
     ("grid", "figure", "said"),
     [
-        ("duration_s = [1.0, 2.0]", "", "duration_s: cannot be varied"),
-        ('"link.loss_ratio" = [0.0, 0.1]', "seed", "figures: seed: another column"),
-        ('"link.loss_ratio" = [0.0, 0.1]', "index", "figures: index: another column"),
+        (
+            'camera_source = ["pose", "rendered"]',
+            "camera_source",
+            "camera_source: cannot be varied",
+        ),
+        ('"link.loss_ratio" = [0.0, 0.1]', "seed", "figure 'seed': tables have a column seed"),
+        ('"link.loss_ratio" = [0.0, 0.1]', "index", "figure 'index': tables have a column index"),
     ],
 )
 def test_no_two_columns_have_one_name(tmp_path: Path, grid: str, figure: str, said: str) -> None:

@@ -48,8 +48,8 @@ def ablation_block():
     """Return the table of `hil ablate` with the gains that ship, and the cells it is of."""
     found = json.loads((ROOT / "hil/data/ablation.json").read_text(encoding="utf-8"))
     table = "\n".join(words.ablation_table({"ablation": found["rows"]}))
-    cells = ", ".join(found["cells"])
-    return f"With the gains that ship, in {len(found['cells'])} unseen cells ({cells}):\n\n{table}"
+    cells = len(found["cells"])
+    return f"With the gains that ship, in {cells} unseen cells of `{found['deck']}`:\n\n{table}"
 
 
 def filled(text, name, content):

@@ -21,9 +21,11 @@ void receive(Board& board) {
   const uart::Span bytes = uart::received(g_host);
   if (bytes.size == 0) return;
   const uint32_t now_us = ticker::now_us();
+  board.wired = g_host == uart::kUsb;
   uart::drop(g_host, static_cast<uint8_t>(board_receive(board, bytes.data, bytes.size, now_us)));
-  if (board.link.received == g_frames) return;
-  g_frames = board.link.received;
+  const uint32_t frames = board_heard(board);
+  if (frames == g_frames) return;
+  g_frames = frames;
   g_heard_us = now_us;
 }
 

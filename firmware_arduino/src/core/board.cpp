@@ -80,6 +80,49 @@ void actuate(Board& b, BoardOutputs& out) {
   out = {b.wheel[LEFT].pwm, b.wheel[RIGHT].pwm};
 }
 
+void refuse_frame(Board& b, Text why) {
+  count_up(b.link.bad);
+  say(b, why);
+}
+
+// A good frame has come: it is acted on, waits for the check of its signature, or is refused. True when that
+// was costly or is not over.
+bool take_frame(Board& b, uint32_t t_us) {
+  Link& link = b.link;
+  Signer& signer = link.signer;
+  const bool is_signed = (link.rx.incompat_flags & MAVLINK_IFLAG_SIGNED) != 0;
+  const bool sets_key = link.rx.msgid == MAVLINK_MSG_ID_SETUP_SIGNING;  // whoever has the cable may
+  if (sets_key || (signer.mode == Signing::OFF && !is_signed)) return protocol_handle(b, t_us);
+  if (signer.mode == Signing::OFF) {
+    refuse_frame(b, Text::SIGNED_NO_KEY);
+  } else if (signer.mode == Signing::LOCKED || !is_signed) {
+    refuse_frame(b, Text::SIGNED_NOT);
+  } else if (!signer_is_new(signer, link_sender(link))) {
+    refuse_frame(b, Text::SIGNED_OLD);
+  } else {
+    signer.waiting = true;
+    signer.arrived_us = t_us;
+  }
+  return signer.waiting;
+}
+
+void act_on_checked(Board& b) {
+  Signer& signer = b.link.signer;
+  signer.job = HashJob::NONE;
+  signer.waiting = false;
+  // One that lies too far ahead comes again: its sender's stamp is stored first.
+  if (signer_take(signer, link_sender(b.link))) protocol_handle(b, signer.arrived_us);
+}
+
+bool store_signing(Board& b, StoredByte& out) {
+  Signer& signer = b.link.signer;
+  if (signer_store(signer, out)) return true;
+  if (!signer.key_written) return false;
+  signer.key_written = false;
+  say(b, signer.mode == Signing::ON ? Text::KEY_SET : Text::KEY_CLEARED);
+  return false;
+}
+
 }  // namespace
 
 void board_init(Board& b) {
@@ -95,7 +138,8 @@ void board_init(Board& b) {
 
 uint16_t board_receive(Board& b, const uint8_t* bytes, uint16_t n, uint32_t t_us) {
   for (uint16_t i = 0; i < n; ++i) {
-    if (link_take(b.link, bytes[i]) && protocol_handle(b, t_us)) return static_cast<uint16_t>(i + 1);
+    if (b.link.signer.waiting) return i;
+    if (link_take(b.link, bytes[i]) && take_frame(b, t_us)) return static_cast<uint16_t>(i + 1);
   }
   return n;
 }
@@ -107,7 +151,34 @@ void board_tick(Board& b, const BoardInputs& in, BoardOutputs& out) {
   control(b);
   limit(b);
   actuate(b, out);
+  signer_tick(b.link.signer);
   report_tick(b);
+}
+
+bool board_idle(Board& b) {
+  Signer& signer = b.link.signer;
+  if (signer.job == HashJob::NONE && !link_begin_hash(b.link)) return false;
+  const HashJob job = signer.job;
+  if (job == HashJob::ACT) {
+    act_on_checked(b);
+    return true;
+  }
+  uint8_t signature[SIGNATURE_SIZE];
+  if (!signer_slice(signer, signature)) return true;
+  if (job == HashJob::SIGN) {
+    link_signed(b.link, signature);
+  } else if (link_checked(b.link, signature)) {
+    signer.job = HashJob::ACT;  // in a call of its own: a tick may be due
+  } else {
+    refuse_frame(b, Text::SIGNED_OTHERWISE);
+  }
+  return true;
+}
+
+bool board_hashes(const Board& b) { return b.link.signer.waiting || b.link.tx.ready != b.link.tx.head; }
+
+uint32_t board_heard(const Board& b) {
+  return b.link.signer.mode == Signing::OFF ? b.link.received : b.link.signer.heard;
 }
 
 void board_slack(Board& b) {
@@ -123,6 +194,7 @@ ImageResult board_load(Board& b, StorageRead read, void* storage) {
   protocol_retune(b);
   if (stored.result == ImageResult::DAMAGED) say(b, Text::STORAGE_DAMAGED);
   if (stored.older) say(b, Text::STORAGE_OLD);
+  if (signer_load(b.link.signer, read, storage)) say(b, Text::KEY_DAMAGED);
   return stored.result;
 }
 
@@ -133,7 +205,7 @@ bool board_store(Board& b, StoredByte& out) {
     save_end(s);
     if (!s.wanted) protocol_acknowledge(b, MAV_CMD_PREFLIGHT_STORAGE, MAV_RESULT_ACCEPTED);
   }
-  if (!s.wanted) return false;
+  if (!s.wanted) return store_signing(b, out);
   save_begin(s, b.params);
   return save_next(s, out);
 }

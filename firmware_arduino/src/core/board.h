@@ -34,7 +34,7 @@ struct Setpoint {
   bool any;       // one has come since arming
 };
 
-constexpr uint8_t TEXT_BYTES = 5;  // a bit per text of texts.def
+constexpr uint8_t TEXT_BYTES = 6;  // a bit per text of texts.def
 
 struct Board {
   Params params;
@@ -59,18 +59,26 @@ struct Board {
   uint16_t overruns;       // ticks that came more than half a period late
   uint16_t refused;        // set-points
   uint16_t load_permille;  // longest tick of the last second; set by the layer that can measure it
+  bool wired;              // what is received comes over the USB port; set by the layer that knows
 };
 
 // Defaults in force, disarmed, nothing queued.
 void board_init(Board& b);
 // Takes bytes that had arrived by t_us: n of them, or fewer when one ends a frame that is costly to act on,
-// so that a tick that is due need not wait for the next such frame. Returns how many.
+// so that a tick that is due need not wait for the next such frame, or that waits for its signature to be
+// checked (board_idle). Returns how many.
 uint16_t board_receive(Board& b, const uint8_t* bytes, uint16_t n, uint32_t t_us);
 // One control period; call every TICK_US.
 void board_tick(Board& b, const BoardInputs& in, BoardOutputs& out);
 // What a tick leaves for later: parameters that have changed take effect. Call once behind every tick, when
 // its outputs are on the pins.
 void board_slack(Board& b);
+// A slice of what signatures need, 0.2 ms; for whenever there is nothing else to do. True while there is more.
+bool board_idle(Board& b);
+// Whether there is any.
+bool board_hashes(const Board& b);
+// Counts the frames of a host that may command: with a key, those it has signed.
+uint32_t board_heard(const Board& b);
 // Hands out up to `max` bytes for the serial port; returns how many.
 uint16_t board_transmit(Board& b, uint8_t* out, uint16_t max);
 

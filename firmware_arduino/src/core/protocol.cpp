@@ -209,6 +209,16 @@ void on_param_list(Board& b) {
   if (is_for_us(m.target_system, m.target_component)) b.params_next = 0;
 }
 
+// Never answered with what it holds, and nothing of it is kept but the key.
+void on_setup_signing(Board& b) {
+  mavlink_setup_signing_t m;
+  mavlink_msg_setup_signing_decode(&b.link.rx, &m);
+  if (!is_for_us(m.target_system, m.target_component)) return;
+  if (!b.wired) return say(b, Text::KEY_PORT);
+  if (b.safety.state == HIL_STATE_ARMED) return say(b, Text::COMMAND_ARMED);
+  if (signer_set_key(b.link.signer, m.secret_key, m.initial_timestamp)) link_forget_unsigned(b.link);
+}
+
 }  // namespace
 
 void protocol_retune(Board& b) {
@@ -235,6 +245,7 @@ bool protocol_handle(Board& b, uint32_t t_us) {
     case MAVLINK_MSG_ID_PARAM_SET: on_param_set(b); return true;
     case MAVLINK_MSG_ID_PARAM_REQUEST_READ: on_param_read(b); return true;
     case MAVLINK_MSG_ID_PARAM_REQUEST_LIST: on_param_list(b); return false;
+    case MAVLINK_MSG_ID_SETUP_SIGNING: on_setup_signing(b); return true;
     default: return false;
   }
 }

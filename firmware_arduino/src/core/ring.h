@@ -9,8 +9,9 @@ namespace hil {
 // 256 bytes, so that the indices wrap by themselves; it holds up to 255.
 struct Ring {
   uint8_t bytes[256];
-  uint8_t head;  // next to write
-  uint8_t tail;  // next to read
+  uint8_t head;   // next to write
+  uint8_t tail;   // next to read
+  uint8_t ready;  // end of what may be read: behind it a frame waits for its signature
 };
 
 inline uint8_t ring_used(const Ring& r) { return static_cast<uint8_t>(r.head - r.tail); }
@@ -24,7 +25,7 @@ inline void ring_put(Ring& r, const uint8_t* data, uint8_t n) {
 
 inline uint16_t ring_take(Ring& r, uint8_t* out, uint16_t max) {
   uint16_t n = 0;
-  while (n < max && r.tail != r.head) out[n++] = r.bytes[r.tail++];
+  while (n < max && r.tail != r.ready) out[n++] = r.bytes[r.tail++];
   return n;
 }
 

@@ -25,7 +25,7 @@ Tuning tuning(const Params& p) {
 }
 
 bool stepped(const State& sl, const Tuning& t, float setpoint_rad_s) {
-  return further_off(setpoint_rad_s, sl.step_base_rad_s, t.step_rad_s);
+  return fabsf(setpoint_rad_s - sl.step_base_rad_s) > t.step_rad_s;
 }
 
 float step(State& sl, const Tuning& t, const Tracked& w) {

@@ -9,7 +9,6 @@
 #ifndef HIL_CORE_WHEEL_LAW_H
 #define HIL_CORE_WHEEL_LAW_H
 
-#include <math.h>
 #include <stdint.h>
 
 #include "params.h"
@@ -44,11 +43,6 @@ struct Tracked {
 // further beyond the limit it is held at.
 inline bool may_integrate(const Tracked& w, float push) {
   return w.saturation == 0 || (w.saturation > 0) == (push > 0.0f);
-}
-
-// So far is the set-point from the one at which the law last started that it starts anew.
-inline bool further_off(float setpoint_rad_s, float base_rad_s, float step_rad_s) {
-  return fabsf(setpoint_rad_s - base_rad_s) > step_rad_s;
 }
 
 }  // namespace hil

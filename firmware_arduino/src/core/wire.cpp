@@ -21,6 +21,7 @@ namespace hil {
 uint32_t dialect_hash() {
   uint32_t crc = 0;
   for (uint8_t i = 0; i < ENTRY_COUNT; ++i) {
+    if (ENTRIES[i].msgid == MAVLINK_MSG_ID_SETUP_SIGNING) continue;
     crc = crc32(crc, &ENTRIES[i].msgid, 4);
     crc = crc32(crc, &ENTRIES[i].crc_extra, 1);
     crc = crc32(crc, &ENTRIES[i].max_msg_len, 1);

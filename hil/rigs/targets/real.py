@@ -20,7 +20,9 @@ def serial(asked: Asked) -> Rig:
     from hil.rigs.serial import SerialRig, parse_target  # noqa: PLC0415
 
     device, baud = parse_target(f"serial:{asked.where}")
-    rig = SerialRig(device, baud, None)  # the port first: it is what was asked for by name
+    rig = SerialRig(
+        device, baud, None, asked.key
+    )  # the port first: it is what was asked for by name
     try:
         rig.watch_by(open_source(asked.camera, asked.scenario.camera))
     except BaseException:

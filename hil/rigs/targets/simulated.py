@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from hil.config.mismatch import true_robot
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from hil.config.scenario import Scenario
     from hil.core.rig import Rig
     from hil.rigs.asked import Asked
+    from hil.wire.signing import Key
 
 
 @TARGETS.register("twin", summary="the simulated robot and the board's core", simulated=True)
@@ -20,7 +22,8 @@ def twin(asked: Asked) -> Rig:
     """Return the twin; raises BadInput for a camera that a simulated robot is not seen by."""
     from sim_twin.twin import Twin  # noqa: PLC0415 - loads the renderer
 
-    return Twin(twin_setup(asked.scenario, asked.seed), _frame_maker(asked))
+    setup = replace(twin_setup(asked.scenario, asked.seed, asked.key), wired=asked.usb)
+    return _signed(Twin(setup, _frame_maker(asked)), asked)
 
 
 @TARGETS.register(
@@ -33,11 +36,20 @@ def pil(asked: Asked) -> Rig:
     """Return the twin under the board's binary; raises BadInput where its simulator is missing."""
     from sim_twin.pil import Pil  # noqa: PLC0415 - needs simavr
 
-    return Pil(twin_setup(asked.scenario, asked.seed), _frame_maker(asked))
+    setup = twin_setup(asked.scenario, asked.seed, asked.key)
+    uart = "0" if asked.usb else "1"
+    return _signed(Pil(setup, _frame_maker(asked), uart=uart), asked)
 
 
-def twin_setup(scenario: Scenario, seed: int) -> Any:
-    """Return what the simulated rig is made of."""
+def _signed(rig: Rig, asked: Asked) -> Rig:
+    from hil.rigs.signed import SignedRig  # noqa: PLC0415
+
+    return rig if asked.key is None else SignedRig(rig, asked.key)
+
+
+def twin_setup(scenario: Scenario, seed: int, key: Key | None = None) -> Any:
+    """Return what the simulated rig is made of; its board's storage holds the `key`."""
+    from hil.board._firmware import stored_key  # noqa: PLC0415
     from sim_twin.twin import TwinSetup  # noqa: PLC0415
 
     start = scenario.start
@@ -49,6 +61,7 @@ def twin_setup(scenario: Scenario, seed: int) -> Any:
         seed=seed,
         disturbances=scenario.disturbances,
         faults=scenario.faults,
+        eeprom=b"" if key is None else stored_key(key.secret, 0),
     )
 
 

@@ -20,7 +20,7 @@ from hil.analysis.intervals import Interval
 from hil.analysis.stats import Paired, level, paired
 from hil.report.arms import Arm, arm_names, law_rank
 from hil.study.campaign.merge import is_text
-from hil.study.campaign.plan import HOLDS, Campaign, metric_of
+from hil.study.campaign.plan import HOLDS, Campaign, column_of, metric_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -133,7 +133,7 @@ def outcomes_of(campaign: Campaign, table: Table) -> Outcomes:
         campaign,
         tuple(arms[i] for i in order),
         tuple(names[arms[i]] for i in order),
-        {axis: of_pairs(axis) for axis in campaign.axes},
+        {axis: of_pairs(column_of(axis)) for axis in campaign.axes},
         _Figures(table, order, (*campaign.figures, HOLDS.name)),
         complete.reshape(-1, count)[:, order],
         np.column_stack([of_pairs("seed"), of_pairs("draw")]),

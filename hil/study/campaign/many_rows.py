@@ -22,7 +22,7 @@ from hil.analysis.speed import peak_memory_mb
 from hil.core.figures import METRICS
 from hil.study.campaign.findings import documents, outcomes_of
 from hil.study.campaign.maps import write_page
-from hil.study.campaign.plan import Campaign, load_campaign
+from hil.study.campaign.plan import Campaign, column_of, load_campaign
 from hil.study.campaign.results import PARTS, ResultStore, early_ends, program, programs, schema_of
 
 ROWS = (10, 1_000, 100_000, 1_000_000)
@@ -51,7 +51,7 @@ def write_parts(folder: Path, campaign: Campaign) -> int:
         count = len(some)
         points = [dict(job.point) for job in some]
         columns = {
-            **{axis: [float(point[axis]) for point in points] for axis in campaign.axes},
+            **{column_of(axis): [float(point[axis]) for point in points] for axis in campaign.axes},
             **{name: [getattr(job, name) for job in some]
                for name in ("index", "draw", "seed", "outer", "inner")},
             "outcome": ["complete"] * count,

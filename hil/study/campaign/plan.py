@@ -150,6 +150,14 @@ def _parts(name: str) -> tuple[str | int, ...]:
     return tuple(int(part) if part.isdecimal() else part for part in name.split("."))
 
 
+def column_of(axis: str) -> str:
+    """Return the column of the results that holds a varied value: its name, where no other column has that.
+
+    `duration_s` as it was asked for is `scenario.duration_s`; the figure is how long a run lasted.
+    """
+    return f"scenario.{axis}" if axis in BY_NAME or axis in ROW_COLUMNS else axis
+
+
 @dataclass(frozen=True, slots=True)
 class Job:
     """One run of a campaign: its number, its values, its laws and its seed."""
@@ -299,23 +307,13 @@ def load_campaign(name_or_path: str) -> Campaign:
 
 
 def _refuse_taken_names(campaign: Campaign, path: Path) -> None:
-    """Raise BadInput where a varied value or a figure has the name of another column of the results."""
+    """Raise BadInput where a varied value has the name of a figure of one's own."""
     for name in campaign.axes:
-        if name in campaign.figures or name in ROW_COLUMNS:
+        if column_of(name) in campaign.figures:
             raise BadInput(
-                f"{path}: {name}: cannot be varied: the results have {_what(name)} of this name, and the "
-                "two would be one column; write a campaign for each value of it, with "
-                f'set = ["{name}=VALUE"]'
+                f"{path}: {name}: cannot be varied beside a figure of this name: the two would be one "
+                "column; rename the figure"
             )
-    for name in campaign.figures:
-        if name in ROW_COLUMNS:
-            raise BadInput(
-                f"{path}: figures: {name}: another column of the results has this name; rename the figure"
-            )
-
-
-def _what(name: str) -> str:
-    return f"a figure ({metric_of(name).definition})" if name in BY_NAME else "a column"
 
 
 def _refuse_twice(

@@ -34,7 +34,7 @@ from hil.study.campaign.merge import (
     read_group,
     write_tables,
 )
-from hil.study.campaign.plan import Campaign, Job
+from hil.study.campaign.plan import Campaign, Job, column_of
 from hil.study.work_folder import LOCK, SET_ASIDE, is_new, set_aside
 
 Row = dict[str, Any]
@@ -60,7 +60,8 @@ def schema_of(campaign: Campaign) -> pa.Schema:
     first = dict(campaign.jobs()[0].point)
     fields = [("index", pa.int64())]
     fields += [
-        (name, pa.float64() if _is_number(first[name]) else pa.string()) for name in campaign.axes
+        (column_of(name), pa.float64() if _is_number(first[name]) else pa.string())
+        for name in campaign.axes
     ]
     fields += [("draw", pa.int64()), ("seed", pa.int64())]
     fields += [(name, pa.string()) for name in ("outer", "inner", "outcome", "detail")]
@@ -256,7 +257,7 @@ def row_of(
     values = {name: value if math.isfinite(value) else None for name, value in figures}
     return {
         "index": job.index,
-        **{name: float(v) if _is_number(v) else str(v) for name, v in job.point},
+        **{column_of(name): float(v) if _is_number(v) else str(v) for name, v in job.point},
         "draw": job.draw,
         "seed": job.seed,
         "outer": job.outer,

@@ -119,7 +119,8 @@ void bind_link(nb::module_& m) {
       .def_ro("lost", &ReadCounters::lost)
       .def_ro("bad_crc", &ReadCounters::bad_crc)
       .def_ro("skipped_bytes", &ReadCounters::skipped_bytes)
-      .def_ro("foreign", &ReadCounters::foreign);
+      .def_ro("foreign", &ReadCounters::foreign)
+      .def_ro("signed_frames", &ReadCounters::signed_frames);
   nb::class_<FrameReader>(m, "FrameReader")
       .def(nb::init<std::uint8_t>(), "system"_a)
       .def("feed", &fed, "data"_a)
@@ -165,6 +166,9 @@ void bind_link(nb::module_& m) {
 NB_MODULE(_wire, m) {
   nb::set_leak_warnings(false);              // values held by a test session at exit are no leak
   nb::module_::import_("hil.core._native");  // the type of Link.clock
+  m.def(
+      "checksum", [](const nb::bytes& data, std::uint8_t extra) { return wire::checksum(view(data), extra); },
+      "data"_a, "extra"_a);
   bind_wheel_state(m);
   bind_report(m);
   bind_link(m);

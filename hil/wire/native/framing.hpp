@@ -34,6 +34,7 @@ inline std::uint16_t checksum(std::string_view bytes, std::uint8_t extra) {
 // What the reader has met; `lost` counts gaps in the sequence numbers of the source.
 struct ReadCounters {
   std::int64_t frames = 0, lost = 0, bad_crc = 0, skipped_bytes = 0, foreign = 0;
+  std::int64_t signed_frames = 0;  // whose signature cannot be checked here, and which are not taken
 };
 
 inline std::uint32_t message_id(std::string_view frame) {
@@ -81,14 +82,16 @@ class FrameReader {
       const mavlink_msg_entry_t* entry = mavlink_get_msg_entry(message_id(head));
       const std::size_t length = static_cast<std::uint8_t>(head[1]);
       if (entry == nullptr || length > entry->max_msg_len || head[2] != 0) {
+        if (entry != nullptr && length <= entry->max_msg_len && head[2] == MAVLINK_IFLAG_SIGNED) {
+          if (kOverhead + length > head.size()) return;
+          counters.signed_frames += has_crc(head.substr(0, kOverhead + length), *entry);
+        }
         skip(start);
         continue;
       }
       if (kOverhead + length > head.size()) return;
       const std::string_view frame = head.substr(0, kOverhead + length);
-      const std::uint16_t sent = static_cast<std::uint16_t>(
-          static_cast<std::uint8_t>(frame[frame.size() - 2]) | static_cast<std::uint8_t>(frame.back()) << 8);
-      if (checksum(frame.substr(1, frame.size() - 3), entry->crc_extra) != sent) {
+      if (!has_crc(frame, *entry)) {
         ++counters.bad_crc;
         skip(start);
         continue;
@@ -107,6 +110,11 @@ class FrameReader {
     ~Forget() { rest.erase(0, done); }
   };
 
+  static bool has_crc(std::string_view frame, const mavlink_msg_entry_t& entry) {
+    const std::uint16_t sent = static_cast<std::uint16_t>(static_cast<std::uint8_t>(frame[frame.size() - 2]) |
+                                                          static_cast<std::uint8_t>(frame.back()) << 8);
+    return checksum(frame.substr(1, frame.size() - 3), entry.crc_extra) == sent;
+  }
   void skip(std::size_t& start) {
     ++counters.skipped_bytes;
     ++start;
