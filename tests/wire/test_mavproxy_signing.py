@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 import time
@@ -11,10 +10,11 @@ from pathlib import Path
 
 import pytest
 
+MAVPROXY = Path(sys.executable).with_name("mavproxy.py")
 pytestmark = [
     pytest.mark.realtime,
     pytest.mark.skipif(os.name != "posix", reason="a pseudo-terminal"),
-    pytest.mark.skipif(shutil.which("mavproxy.py") is None, reason="needs MAVProxy on the PATH"),
+    pytest.mark.skipif(not MAVPROXY.exists(), reason="no MAVProxy; pip install --no-deps mavproxy"),
 ]
 
 # Seconds to wait before each line.
@@ -28,7 +28,8 @@ UNSIGNED = [(6, "param set PWM_MAX 0.25"), (4, "link"), (2, "")]
 def mavproxy(folder: Path, lines: list[tuple[int, str]]) -> str:
     """Start MAVProxy on the port, type the lines, and return what it has shown."""
     words = [
-        "mavproxy.py",
+        sys.executable,
+        str(MAVPROXY),
         "--master=./port",
         "--baudrate",
         "57600",
