@@ -21,8 +21,6 @@ from hil.wire.link import BoardLink
 from vision.localisers.making import localiser_of_frames
 
 if TYPE_CHECKING:
-    from hil.config.scenario import Scenario
-    from hil.control.vehicles.vehicle import Vehicle
     from hil.core.rig import Rig
     from hil.core.types import OuterLaw
     from hil.record.memory import RunSink
@@ -32,7 +30,10 @@ if TYPE_CHECKING:
 def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw) -> Parts:
     """Return the parts of a session over `rig`, its law under what holds for every law; raises BadInput."""
     scenario, control = spec.scenario, spec.scenario.control
-    vehicle = make_vehicle(scenario.robot)
+    vehicle, limits = make_vehicle(scenario.robot), control.limits
+    law = in_axes(law, control.axes_rad)
+    law = WithinWheelSpeed(law, vehicle, wheel_speed_max_rad_s(scenario.board))
+    law = TurnFirst(law, limits.turn_missing_rad_s)
     timeline = Timeline(recorder, _unix_us)
     return Parts(
         rig=rig,
@@ -42,22 +43,13 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw) -> Par
             scenario.camera, drawn=spec.camera == "pose" and spec.is_simulated
         ),
         estimator=make_estimator(control.estimator, control, vehicle.geometry),
-        law=limited(law, vehicle, scenario),
+        law=LetGo(law, vehicle, limits.let_go_rad_s),
         reference=make_reference(scenario.reference),
         vehicle=vehicle,
         recorder=recorder,
         timeline=timeline,
         own_terms=tuple(OUTER_LAWS.get(spec.outer).trace),
     )
-
-
-def limited(law: OuterLaw, vehicle: Vehicle, scenario: Scenario) -> OuterLaw:
-    """Return the law in its axes, under what holds for every law."""
-    limits = scenario.control.limits
-    law = in_axes(law, scenario.control.axes_rad)
-    law = WithinWheelSpeed(law, vehicle, wheel_speed_max_rad_s(scenario.board))
-    law = TurnFirst(law, limits.turn_missing_rad_s)
-    return LetGo(law, vehicle, limits.let_go_rad_s)
 
 
 def _unix_us() -> int:

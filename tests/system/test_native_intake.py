@@ -25,7 +25,7 @@ from hil.core.clocks import CameraClock
 from hil.record.memory import MemoryRecorder
 from hil.rigs.opening import open_rig
 from hil.runs import session
-from hil.runs.assembly import limited, make_parts
+from hil.runs.assembly import make_parts
 from hil.runs.execute import execute_in_memory
 from hil.runs.provenance import make_manifest, used_things
 from hil.runs.session import Session
@@ -198,7 +198,8 @@ def test_the_comparison_sees_a_changed_law():
         other = own.model_copy(update={"k1_s": math.nextafter(own.k1_s, math.inf)})
         d0_m, limits = scenario.robot.d0_m, scenario.control.limits
         law = make_outer_law("asg-ism", gains.model_copy(update={"asg_ism": other}), limits, d0_m)
-        changed = replace(parts, law=limited(law, parts.vehicle, scenario))
+        beneath = make_parts(spec_of(ONE), parts.rig, parts.recorder, law)
+        changed = replace(parts, law=beneath.law)
         return REAL_DRIVE(changed, *rest)
 
     changed = differences(run(ONE, REAL, make_drive), in_python(ONE))
