@@ -2,10 +2,10 @@
 
 Their one source is Python: hil/control/native/outer/translate.py writes it as C++ while the extension modules
 are built, operation by operation. What is asked for here is given only where the native code is that of the
-objects it stands for: the sources are as they were translated, none of their functions has been replaced, and
-the objects are of these classes themselves with nothing of their own. Every other law runs in Python: one
-from elsewhere, a class derived from a built-in one, a block put around its parts. Native code asks it each
-tick. Where a source was just edited, or a function replaced, all of a run's ticks are Python's.
+objects it stands for: the sources are as they were translated, none of their functions and numbers has been
+replaced, and the objects are of these classes themselves with nothing of their own. Every other law runs in
+Python: one from elsewhere, a class derived from a built-in one, a block put around its parts. Native code
+asks it each tick. Where a source was just edited, or a function replaced, all of a run's ticks are Python's.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
-from hil import control
+from hil.control import AsgIsm as AsgBlock
 from hil.control import _outer
 from hil.control.laws.asg_ism import AsgIsm
 from hil.control.laws.chain import Chain
@@ -29,29 +29,38 @@ from hil.control.laws.state_feedback import StateFeedback
 from hil.control.laws.turn_first import TurnFirst
 from hil.control.laws.within import WithinWheelSpeed
 from hil.control.references import Circle, Point, Stops, Waypoints
-from hil.control.vehicles.vehicle import TwoSided
 from hil.core import _native as core_native
 
 _ROOT = Path(__file__).parents[2]
+# What a module or a class has that native code has taken over.
+_TAKEN = (FunctionType, staticmethod, classmethod, property, type, int, float, tuple)
 
 
-def _functions() -> list[tuple[Any, str, object]]:
-    """Return each function and class that the translated modules call, with whose it is and its name."""
-    found: list[tuple[Any, str, object]] = []
-    for path, _ in _outer.SOURCES:
-        module = import_module(path.removesuffix(".py").replace("/", "."))
-        for name, value in vars(module).items():
-            if isinstance(value, FunctionType | type):
-                found.append((module, name, value))
-            if isinstance(value, type) and value.__module__ == module.__name__:
-                found += [
-                    (value, n, v) for n, v in vars(value).items() if isinstance(v, FunctionType)
-                ]
-    found.append((TwoSided, "wheels", TwoSided.wheels))
-    return found
+def _owners() -> list[Any]:
+    """Return the translated modules and the classes that they define."""
+    paths = [path.removesuffix(".py").replace("/", ".") for path, _ in _outer.SOURCES]
+    modules = [import_module(path) for path in paths]
+    classes = [
+        value
+        for module in modules
+        for value in vars(module).values()
+        if isinstance(value, type) and value.__module__ == module.__name__
+    ]
+    return [*modules, *classes]
 
 
-_FUNCTIONS = _functions()
+def _taken(owner: Any) -> dict[str, Any]:
+    """Return the functions, classes and numbers of a module or class by their names."""
+    return {
+        name: value
+        for name, value in vars(owner).items()
+        if isinstance(value, _TAKEN) and not name.startswith("__")
+    }
+
+
+_PARTS = [(owner, [*taken], [*taken.values()]) for owner in _owners() if (taken := _taken(owner))]
+_FUNCTIONS = [v for _, _, values in _PARTS for v in values if isinstance(v, FunctionType)]
+_CODES = [function.__code__ for function in _FUNCTIONS]
 
 
 @cache
@@ -74,8 +83,9 @@ def _pairs() -> list[tuple[float, float]]:
 
 
 def _is_whole() -> bool:
-    """Say whether nobody has replaced a function since."""
-    return all(vars(owner).get(name) is value for owner, name, value in _FUNCTIONS)
+    """Say whether nobody has replaced a function or a number since."""
+    parts = all([*map(vars(owner).get, names)] == values for owner, names, values in _PARTS)
+    return parts and [function.__code__ for function in _FUNCTIONS] == _CODES
 
 
 def _is_plain(made: object) -> bool:
@@ -110,7 +120,7 @@ def is_translated(law: Any) -> bool:
     kind = type(law)
     if not (kind is StateFeedback or kind is AsgIsm) or not _is_plain(law):
         return False
-    blocks = kind is StateFeedback or type(law._block) is control.AsgIsm
+    blocks = kind is StateFeedback or type(law._block) is AsgBlock
     return blocks and type(law._chain) is Chain and _is_plain(law._chain)
 
 
@@ -128,10 +138,13 @@ _AROUND: dict[type, Callable[[_outer.OuterLaw, Any], _outer.OuterLaw]] = {
 }
 
 
+_REFERENCES = {Point, Circle, Waypoints, Stops}
+
+
 def native_reference(reference: Any) -> _outer.Reference | None:
     """Return the native reference that is the same motion; None where there is none."""
     kind = type(reference)
-    if not (_as_translated() and _is_whole()) or not _is_plain(reference):
+    if kind not in _REFERENCES or not (_as_translated() and _is_whole() and _is_plain(reference)):
         return None
     if kind is Point:
         return _outer.point(reference._state)

@@ -199,8 +199,10 @@ NB_MODULE(_outer, m) {
       [](const std::exception_ptr& thrown, void*) {
         try {
           std::rethrow_exception(thrown);
-        } catch (const outer::ArithmeticError& error) {
-          PyErr_SetString(PyExc_ArithmeticError, error.what());
+        } catch (const outer::PythonError& error) {
+          PyObject* const kinds[] = {PyExc_ZeroDivisionError, PyExc_ValueError, PyExc_OverflowError,
+                                     PyExc_TypeError};
+          PyErr_SetString(kinds[error.kind], error.what());
         }
       },
       nullptr);

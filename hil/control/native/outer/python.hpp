@@ -22,9 +22,11 @@ namespace outer {
 using Vec2 = std::tuple<double, double>;
 
 // Where Python's arithmetic raises and C++'s does not. A law that does so ends the run.
-class ArithmeticError : public std::runtime_error {
+class PythonError : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  enum Kind { kZeroDivision, kValue, kOverflow, kType };
+  PythonError(Kind kind, const char* text) : std::runtime_error(text), kind(kind) {}
+  Kind kind;
 };
 
 namespace m {
@@ -36,17 +38,17 @@ constexpr double inf = std::numeric_limits<double>::infinity();
 constexpr double pi = 3.14159265358979323846;
 
 inline double quotient(double a, double b) {
-  if (b == 0.0) throw ArithmeticError("ZeroDivisionError: float division by zero");
+  if (b == 0.0) throw PythonError(PythonError::kZeroDivision, "float division by zero");
   return a / b;
 }
 inline double in_domain(double x, bool is) {
-  if (!is) throw ArithmeticError("ValueError: math domain error");
+  if (!is) throw PythonError(PythonError::kValue, "math domain error");
   return x;
 }
 inline double power(double x, double y) {
   const double out = core::power(x, y);
   if (!std::isfinite(out) && std::isfinite(x) && std::isfinite(y)) {
-    throw ArithmeticError("OverflowError: Numerical result out of range");
+    throw PythonError(PythonError::kOverflow, "Numerical result out of range");
   }
   return out;
 }
@@ -120,7 +122,7 @@ class Opt {
     return *this;
   }
   operator const T&() const {
-    if (!is_) throw ArithmeticError("TypeError: None where a number is needed");
+    if (!is_) throw PythonError(PythonError::kType, "None where a number is needed");
     return value_;
   }
   bool is_none() const { return !is_; }

@@ -47,6 +47,12 @@ class Maker {
              pose_ = types_.attr("Pose");
 };
 
+double number(const nb::object& value) {
+  const double found = PyFloat_AsDouble(value.ptr());
+  if (found == -1.0 && PyErr_Occurred() != nullptr) throw nb::python_error();
+  return found;
+}
+
 const Maker& made() {
   static const Maker* maker = new Maker();  // never freed: the interpreter ends first
   return *maker;
@@ -54,22 +60,20 @@ const Maker& made() {
 
 }  // namespace
 
-PythonLaw::PythonLaw(const nb::object& law, const nb::tuple& own)
-    : reset_(law.attr("reset")), step_(law.attr("step")) {
+PythonLaw::PythonLaw(const nb::object& law, const nb::tuple& own) : law_(law) {
   for (const char* key : outer::kTraceKeys) keys_.push_back(nb::str(key));
   for (nb::handle key : own) keys_.push_back(nb::borrow(key));
   if (keys_.size() > outer::kTraceSlots) throw nb::value_error("too many names in the trace");
 }
 
 void PythonLaw::reset(const outer::ReferenceState& reference, const outer::Estimate& estimate) {
-  reset_(made().of(reference), made().of(estimate));
+  law_.attr("reset")(made().of(reference), made().of(estimate));
 }
 
 outer::OuterCommand PythonLaw::step(const outer::ReferenceState& reference, const outer::Estimate& estimate,
                                     double dt_s) {
-  const nb::object out = step_(made().of(reference), made().of(estimate), dt_s);
-  return {nb::cast<double>(out.attr("eta1_m_s")), nb::cast<double>(out.attr("theta_dot_rad_s")),
-          trace_of(out.attr("trace"))};
+  const nb::object out = law_.attr("step")(made().of(reference), made().of(estimate), dt_s);
+  return {number(out.attr("eta1_m_s")), number(out.attr("theta_dot_rad_s")), trace_of(out.attr("trace"))};
 }
 
 outer::Trace PythonLaw::trace_of(const nb::object& trace) const {
@@ -83,9 +87,7 @@ outer::Trace PythonLaw::trace_of(const nb::object& trace) const {
       value = trace.attr("__getitem__")(keys_[key]);
     }
     if (!value.is_valid()) continue;
-    const double found = PyFloat_AsDouble(value.ptr());
-    if (found == -1.0 && PyErr_Occurred() != nullptr) throw nb::python_error();
-    out = std::move(out).with(key, found);
+    out = std::move(out).with(key, number(value));
   }
   return out;
 }

@@ -19,6 +19,6 @@ class PythonLaw final : public outer::OuterLaw {
  private:
   outer::Trace trace_of(const nanobind::object& trace) const;
 
-  nanobind::object reset_, step_;
+  nanobind::object law_;
   std::vector<nanobind::object> keys_;
 };

@@ -21,6 +21,8 @@ PARTS = (
     Part("hil/core/types.py", ("Pose", "Estimate", "ReferenceState", "OuterCommand")),
     Part("hil/config/control.py", ("OuterLimits", "CircleReference")),
     Part("hil/control/estimators/geometry.py", ("BelievedGeometry",), leave=("body",)),
+    # Native code goes from its geometry straight to the wheels: only as long as this says the same.
+    Part("hil/control/vehicles/vehicle.py", ()),
     Part("hil/control/bounds.py", ("disturbance_bound",)),
     Part(
         "hil/control/laws/chain.py",
