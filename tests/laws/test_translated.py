@@ -259,6 +259,11 @@ def test_a_law_with_more_names_than_there_is_room_for_stays_in_python():
     assert translated.native_law(Traced({}), names[1:]) is not None
 
 
+def test_the_vehicle_is_among_the_sources_that_are_looked_at():
+    """Native code goes from the geometry to the wheels without it: an edited one is run in Python."""
+    assert "hil/control/vehicles/vehicle.py" in [path for path, _ in _outer.SOURCES]
+
+
 @pytest.mark.parametrize(
     ("owner", "name", "value"),
     [
