@@ -317,7 +317,7 @@ def test_native_arithmetic_raises_what_python_raises():
     limits = OuterLimits(approach_speed_m_s=1e-200)
     made = AsgIsm(ControlConfig().active_gains.asg_ism, limits, D0_M)
     for law in (made, translated.native_law(made)):
-        with pytest.raises(ZeroDivisionError, match=r"^float division by zero$"):
+        with pytest.raises(ZeroDivisionError, match=r"division by zero$"):
             law.reset(point(0, 0), estimate(0.3))
 
 
