@@ -26,7 +26,7 @@ constexpr uint8_t SENDERS = 4;
 constexpr Stamp STAMP_MINUTE = 6000000;
 // No clock says more: 48 bits end in 2104, and a board that took their last stamp would hear nobody again. The
 // year behind it is for its own clock.
-constexpr Stamp STAMP_MOST = 0xFFFFFFFFFFFF - 365 * 24 * 60 * STAMP_MINUTE;
+constexpr Stamp STAMP_MOST = 0xFFFFFFFFFFFF - 525600 * STAMP_MINUTE;
 // What of a frame is hashed after the key: header, payload, CRC, link id, stamp; room for its padding too.
 constexpr uint8_t SIGNED_PAD = 2 * SHA_BLOCK - KEY_SIZE;
 
