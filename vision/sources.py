@@ -210,6 +210,12 @@ class LiveCamera:
             done, image = self._capture.retrieve()
             if not done or image is None:
                 continue  # a broken JPEG: as good as a dropped frame
+            if image.shape[:2] != (self.height_px, self.width_px):
+                self._queue.fail(
+                    f"{self.name}: a picture of {image.shape[1]} x {image.shape[0]} px came, its driver"
+                    f" says {self.width_px} x {self.height_px} px; take a size that it offers"
+                )
+                return
             if not self._watch.take(stamp_s, arrival_s, np.asarray(image, dtype=np.uint8)):
                 continue  # the frame before once more
             said = self._watch.said()

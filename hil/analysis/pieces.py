@@ -7,7 +7,7 @@ memory and for one on disk: the pieces are the same. Nothing here holds more tha
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
@@ -37,10 +37,17 @@ class OnDisk(Protocol):
         """Yield some of the columns, a row group at a time."""
 
 
+def _on_disk(columns: Columns) -> OnDisk | None:
+    """Return the table where its columns are on disk."""
+    # A dictionary is asked first: whether something keeps to a protocol is a long question.
+    return None if isinstance(columns, dict) or not isinstance(columns, OnDisk) else columns
+
+
 def row_count(columns: Columns) -> int:
     """Return how many rows a table of samples has; 0 for one without a time."""
-    if isinstance(columns, OnDisk):
-        return columns.rows
+    stored = _on_disk(columns)
+    if stored is not None:
+        return stored.rows
     return int(columns["t_s"].size) if "t_s" in columns else 0
 
 
@@ -54,7 +61,8 @@ def pieces(columns: Columns, names: Sequence[str], before: int = 0) -> Iterator[
 
 
 def _pieces(columns: Columns, names: Sequence[str]) -> Iterator[dict[str, Array]]:
-    tables = columns.groups(names) if isinstance(columns, OnDisk) else iter((columns,))
+    stored = _on_disk(columns)
+    tables = stored.groups(names) if stored is not None else iter((columns,))
     for table in tables:
         some = {name: table[name] for name in names}
         rows = len(next(iter(some.values())))
@@ -67,13 +75,11 @@ def percentiles(parts: Callable[[], Iterator[Array]], percents: Sequence[float])
 
     `parts` is called several times and must give the same values each time. NaN without any value.
     """
-    counts = [np.count_nonzero(np.isfinite(values)) for values in parts()]
-    total = int(sum(counts))
+    total, held = _held(values[np.isfinite(values)] for values in parts())
     if total == 0:
         return [math.nan] * len(percents)
     if total <= PIECE_ROWS:
-        held = np.concatenate([values[np.isfinite(values)] for values in parts()])
-        return [float(value) for value in np.percentile(held, percents)]
+        return [float(value) for value in np.percentile(np.concatenate(held), percents)]
     places = [(total - 1) * (percent / 100.0) for percent in percents]
     low = [min(math.floor(place), total - 1) for place in places]
     wanted = sorted({rank for first in low for rank in (first, min(first + 1, total - 1))})
@@ -89,10 +95,20 @@ def median(parts: Callable[[], Iterator[Array]]) -> float:
 
     As numpy.median where they fit a piece; of more, those that are finite.
     """
-    if sum(values.size for values in parts()) > PIECE_ROWS:
+    total, held = _held(parts())
+    if total > PIECE_ROWS:
         return percentiles(parts, [50])[0]
-    held = np.concatenate([*parts(), np.empty(0)])
-    return float(np.median(held)) if held.size else math.nan
+    return float(np.median(np.concatenate(held))) if total else math.nan
+
+
+def _held(parts: Iterable[Array]) -> tuple[int, list[Array]]:
+    """Return how many values there are, and the arrays themselves as far as they fit a piece."""
+    total, held = 0, []
+    for values in parts:
+        total += values.size
+        if total <= PIECE_ROWS:
+            held.append(values)
+    return total, held
 
 
 def _between(low: float, high: float, share: float) -> float:

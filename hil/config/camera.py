@@ -20,6 +20,7 @@ from pydantic import (
 )
 
 from hil.config.base import Section, known_name, quantity
+from hil.config.controls import ControlsConfig
 from hil.config.own_settings import BY_NAME_KEY, own_of, validated
 from hil.core.registries import LOCALISERS
 
@@ -346,6 +347,7 @@ class CameraConfig(Section):
     localiser_settings: SerializeAsAny[BaseModel] = Field(
         default_factory=dict, validate_default=True, description="values of the localiser's own"
     )
+    controls: ControlsConfig = ControlsConfig()
     lens: LensConfig = LensConfig()
     pose: CameraPoseConfig = CameraPoseConfig()
     marks: MarksConfig = MarksConfig()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from hil.config.controls import ControlsConfig
 from hil.console.child import begin, ordered, tell
 from hil.console.hand_over import HEAD, PICTURE
 from hil.console.orders import camera_of
@@ -23,15 +24,9 @@ if TYPE_CHECKING:
 _NAME = re.compile(r"live-\d{3}\.png|[\w][\w .()+-]{0,118}", re.ASCII)
 
 
-class Controls(BaseModel):
+class Controls(ControlsConfig):
     """What a live camera is set to; None leaves it at what its automatics choose."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-    exposure: float | None = None
-    gain: float | None = None
-    white_balance_k: float | None = Field(None, ge=0, le=100_000)
-    focus: float | None = None
     width_px: int | None = Field(None, ge=64, le=4096)
     height_px: int | None = Field(None, ge=64, le=4096)
     rate_hz: float | None = Field(None, gt=0, le=240)

@@ -56,6 +56,12 @@ class Rows:
             raise ValueError(f"a row of {len(row)} values, the table has {self._width} columns")
         self._values.extend(row)
 
+    def take(self, rows: bytes) -> None:
+        """Append whole rows as they lie in memory, 8 bytes a value."""
+        if len(rows) % (8 * self._width):
+            raise ValueError(f"{len(rows)} bytes are no rows of {self._width} values")
+        self._values.frombytes(rows)
+
     def __len__(self) -> int:
         """Return how many rows there are."""
         return len(self._values) // self._width

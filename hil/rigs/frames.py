@@ -24,6 +24,7 @@ from vision.frame_queue import FrameQueue
 
 if TYPE_CHECKING:
     from hil.config.camera import CameraConfig
+    from vision.sources import CameraControls
 
 TWIN_PREFIX = "twin:"
 
@@ -44,27 +45,55 @@ class FrameSource(Protocol):
 def open_source(text: str, wanted: CameraConfig | None = None) -> FrameSource:
     """Return the source that `--camera` names: INDEX, FILE or twin:SOCKET.
 
-    A live camera is asked for the size and rate `wanted`. Raises BadInput or RigFault.
+    A live camera is asked for the size, rate and controls `wanted`. Raises BadInput or RigFault.
     """
+    size_px = (wanted.width_px, wanted.height_px) if wanted else None
     if text.startswith(TWIN_PREFIX):
-        return SocketSource(text.removeprefix(TWIN_PREFIX))
+        return SocketSource(text.removeprefix(TWIN_PREFIX), size_px)
     if text.isdigit():
-        from vision.sources import CameraControls, LiveCamera  # noqa: PLC0415 - most runs have none
+        from vision.sources import LiveCamera  # noqa: PLC0415 - most runs have none
 
-        size = (wanted.width_px, wanted.height_px, wanted.rate_hz) if wanted else ()
-        return LiveCamera(int(text), CameraControls(*size))
+        return LiveCamera(int(text), controls_of(wanted))
     if Path(text).is_file():
-        return CaptureSource(text)
+        return CaptureSource(text, size_px)
     raise BadInput(
         f"camera {text!r}: neither a camera index, a video file nor twin:SOCKET; "
         "`hil doctor` lists the cameras"
     )
 
 
-class CaptureSource:
-    """A video file through OpenCV, played at its own rate; `t_cam_s` is the container's stamp."""
+def wrong_size(have_px: tuple[int, int], wanted_px: tuple[int, int] | None) -> str:
+    """Return what is wrong with the size of a delivered picture, "" for nothing.
 
-    def __init__(self, path: str) -> None:
+    Lens and pose of a camera hold for one width and height, px.
+    """
+    if wanted_px is None or have_px == wanted_px:
+        return ""
+    return (
+        f"pictures of {have_px[0]} x {have_px[1]} px, the lens is that of"
+        f" {wanted_px[0]} x {wanted_px[1]} px; set camera.width_px and height_px with a lens"
+        " calibrated at that size"
+    )
+
+
+def controls_of(wanted: CameraConfig | None) -> CameraControls:
+    """Return what a live camera is set to for a run: nothing where none is described."""
+    from vision.sources import CameraControls  # noqa: PLC0415 - most runs have none
+
+    if wanted is None:
+        return CameraControls()
+    return CameraControls(
+        wanted.width_px, wanted.height_px, wanted.rate_hz, **wanted.controls.model_dump()
+    )
+
+
+class CaptureSource:
+    """A video file through OpenCV, played at its own rate; `t_cam_s` is the container's stamp.
+
+    Raises BadInput where its pictures are not of `size_px`, width and height; None takes any.
+    """
+
+    def __init__(self, path: str, size_px: tuple[int, int] | None = None) -> None:
         import cv2  # noqa: PLC0415 - most runs have no camera and need not load the decoders
 
         self._name = f"camera {path}"
@@ -73,6 +102,13 @@ class CaptureSource:
             raise BadInput(f"{self._name}: not a video OpenCV can read")
         # A rotation tag turns the picture and not the lens.
         self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0.0)
+        have = tuple(
+            round(self._capture.get(key))
+            for key in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
+        )
+        if why := wrong_size((have[0], have[1]), size_px):
+            self._capture.release()
+            raise BadInput(f"{self._name}: {why}")
         self._stamp_property = cv2.CAP_PROP_POS_MSEC
         self._queue = FrameQueue()
         self._stop = threading.Event()
@@ -140,9 +176,10 @@ def _decode_frame(head: dict[str, Any], body: bytes) -> Frame:
 
 
 class SocketSource:
-    """The frames of a served twin, from its Unix socket."""
+    """The frames of a served twin, from its Unix socket; of `size_px`, else it is a rig fault."""
 
-    def __init__(self, path: str) -> None:
+    def __init__(self, path: str, size_px: tuple[int, int] | None = None) -> None:
+        self._size_px = size_px
         self._name = f"camera {TWIN_PREFIX}{path}"
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
@@ -161,6 +198,11 @@ class SocketSource:
             try:
                 while line := stream.readline():
                     head, length = _decode_head(line)
+                    if "shape" in head:
+                        height, width, _ = head["shape"]
+                        if why := wrong_size((width, height), self._size_px):
+                            self._queue.fail(f"{self._name}: {why}")
+                            return
                     self._queue.put(_decode_frame(head, stream.read(length)))
             except (OSError, ValueError) as error:
                 self._queue.fail(f"{self._name}: {error}")

@@ -2,7 +2,9 @@
 
 from collections.abc import Callable, Sequence
 
+from hil.control._outer import OuterLaw, Reference
 from hil.control.estimators._fused import Fused
+from hil.control.estimators.geometry import BelievedGeometry
 from hil.core._native import CameraClock
 from hil.core.rig import Truth
 from hil.core.types import Estimate, OuterCommand, Pose, Vec2
@@ -136,7 +138,9 @@ class Pump:
     def begin(self, until_s: float, busy: bool) -> int: ...
     def go_on(self, busy: bool) -> int: ...
     def others(self) -> list[tuple[int, bytes]]: ...
-    def frame_rows(self, origin_s: float) -> list[tuple[float, ...]]: ...
+    def frame_rows(self, origin_s: float) -> bytes:
+        """Return the frames taken, rows of hil.record.schema.FRAME_NAMES in doubles."""
+
     def check(self, watch: Watch, now_s: float, pwm_top_counts: int) -> None: ...
     rig_now_s: float
     def look(self, watch: Watch, now_s: float, most_counts: float, stall_counts: float) -> Estimate:
@@ -158,3 +162,31 @@ class Pump:
         """Send what a tick asks of the wheels, tell everyone of it, and return its row."""
 
     def send_setpoint(self, t_s: float, left_rad_s: float, right_rad_s: float) -> None: ...
+
+class Drive:
+    """The ticks of a run in native code; see native/drive.hpp."""
+
+    def __init__(
+        self,
+        *,
+        pump: Pump,
+        watch: Watch,
+        law: OuterLaw,
+        reference: Reference,
+        geometry: BelievedGeometry,
+        t0_s: float,
+        period_s: float,
+        ticks: int,
+        common: list[int],
+        own: list[int],
+    ) -> None: ...
+    def run(self, busy: bool, refused: bool, board: tuple[int, float, float]) -> int:
+        """Go on until somebody is needed; `board` is its PWM's top, most and stall counts."""
+    reached_s: float
+    def take_rows(self) -> bytes:
+        """Return the rows of ticks since the last call, in doubles."""
+
+DONE: int
+DRIVE_HEARD: int
+DRIVE_TAKEN: int
+ASKED: int

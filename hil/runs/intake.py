@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from hil.core.types import PoseMeasurement
+from hil.record.memory import MemoryRecorder
 from hil.runs import _native
 from hil.runs.watching import picture_of
 from hil.wire.refusal import refused_set_point
@@ -68,14 +69,19 @@ class Intake:
         stop = pump.begin(until_s, link.busy)
         while stop != _native.REACHED:
             if stop == _native.HEARD:
-                link.t_s = pump.now_s
-                for msg_id, frame in pump.others():
-                    link.heard(msg_id, frame)
-                link.step()
+                self.hear(pump)
             else:
-                self._note_texts()
+                self.note_texts()
             stop = pump.go_on(link.busy)
         link.t_s = pump.now_s
+
+    def hear(self, pump: _native.Pump) -> None:
+        """Take the messages that native code does not know, and move the procedure under way on."""
+        link = self._parts.link
+        link.t_s = pump.now_s
+        for msg_id, frame in pump.others():
+            link.heard(msg_id, frame)
+        link.step()
 
     def _take_all(self, now_s: float) -> None:
         link = self._parts.link
@@ -85,9 +91,10 @@ class Intake:
         poll_frame = self._parts.rig.poll_frame
         while (frame := poll_frame()) is not None:
             self._take_frame(frame, now_s)
-        self._note_texts()
+        self.note_texts()
 
-    def _note_texts(self) -> None:
+    def note_texts(self) -> None:
+        """Record what the board has said since the last call."""
         link = self._parts.link
         new = link.texts_heard - self._texts_noted
         if not new:
@@ -144,5 +151,6 @@ class Intake:
         """Record the frames that native code has taken."""
         origin_s = self._parts.timeline.origin_s
         if self._pump is not None and origin_s is not None:
-            for row in self._pump.frame_rows(origin_s):
-                self._parts.recorder.frame(row)
+            recorder = self._parts.recorder
+            assert isinstance(recorder, MemoryRecorder)  # else there is no pump
+            recorder.frames.take(self._pump.frame_rows(origin_s))

@@ -16,6 +16,7 @@ from hil.core.errors import RecordFault, RigFault
 from hil.core.registry import in_one_line
 from hil.record.schema import TRACE_KEYS
 from hil.runs import _native
+from hil.runs.driving import drive_to_end, make_drive
 from hil.runs.intake import Intake
 from hil.runs.parts import Ending, Parts, Progress, Publish, Situation
 from hil.runs.watching import DIAGNOSIS, make_pump, make_watch
@@ -71,7 +72,7 @@ class Session:
 
     def run(self) -> Ending:
         """Run all phases; the robot is stopped whatever happens."""
-        for _ in self.steps():
+        for _ in self._phases(looked_at=self._publish is not None or self._progress is not None):
             pass
         return self.ending
 
@@ -80,12 +81,15 @@ class Session:
 
         Time of a simulated rig stands still in a pause. Closing the iterator stops the robot.
         """
+        return self._phases(looked_at=True)
+
+    def _phases(self, *, looked_at: bool) -> Generator[Situation]:
         try:
             self._connect()
             self._find_robot()
             self._pump_while(self._parts.orders.hold, math.inf)
             self._arm()
-            yield from self._control()
+            yield from self._control(looked_at=looked_at)
             self.ending = Ending("complete")
         except RigFault as fault:
             self.ending = Ending("fault", str(fault))
@@ -165,13 +169,20 @@ class Session:
             raise RigFault(f"board: acknowledged arming and stayed {link.state_name}")
         self._note("armed", link.state_name)
 
-    def _control(self) -> Generator[Situation]:
+    def _control(self, *, looked_at: bool) -> Generator[Situation]:
         scenario, rig, law = self._scenario, self._parts.rig, self._parts.law
         period_s = 1.0 / scenario.control.rate_hz
         ticks = round(scenario.duration_s * scenario.control.rate_hz) + 1
         self._t0_s = rig.now_s()
         self._parts.timeline.start(self._t0_s)
         rig.begin(self._t0_s)
+        drive = None
+        if self._pump is not None and not looked_at:
+            drive = make_drive(self._parts, self._pump, self._watch, self._t0_s, period_s, ticks)
+        if self._pump is not None and drive is not None:
+            board, check = self._board_counts, self._check_safety
+            drive_to_end(drive, self._parts, self._pump, self._intake, board, check)
+            return
         for tick in range(ticks):
             due_s = self._t0_s + tick * period_s
             self._intake.until(due_s)
@@ -250,9 +261,8 @@ class Session:
 
     def _estimate(self, now_s: float) -> Estimate:
         """Return the state at the actuation time of a tick, inside the fence; else RigFault."""
-        link, watch = self._parts.link, self._watch
-        most_counts = link.info.pwm_top_counts * link.parameters.get("PWM_MAX", 1.0)
-        stall_counts = link.info.pwm_top_counts * link.parameters.get("STALL_DUTY", 1.0)
+        watch = self._watch
+        _, most_counts, stall_counts = self._board_counts()
         if self._pump is not None:
             return self._pump.look(watch, now_s, most_counts, stall_counts)
         estimate = self._parts.estimator.estimate_at(now_s + watch.uplink_s)
@@ -263,6 +273,16 @@ class Session:
         if sides == (0, 0) and not hard:
             return estimate
         return replace(estimate, sides_at_limit=sides, driven_hard=hard)
+
+    def _board_counts(self) -> tuple[int, float, float]:
+        """Return the counts of the board's PWM at its top, at its limit, and at a stall."""
+        link = self._parts.link
+        top_counts = link.info.pwm_top_counts
+        return (
+            top_counts,
+            top_counts * link.parameters.get("PWM_MAX", 1.0),
+            top_counts * link.parameters.get("STALL_DUTY", 1.0),
+        )
 
     # -- out -----------------------------------------------------------------------------------
 

@@ -1,6 +1,6 @@
 """`hil bench vision`: the colour marks found on rendered sequences with known truth.
 
-The robot drives an ellipse at 0.5 m/s under two camera poses, at two resolutions and in four
+The robot drives an ellipse at 0.5 m/s under two camera poses, at three resolutions and in four
 conditions; the errors are against the pose at the middle of the exposure. A second part shows the
 localiser scenes with coloured things and no robot.
 """
@@ -39,7 +39,7 @@ VIEWS: dict[View, CameraPoseConfig] = {
     "ceiling": CameraPoseConfig(eye_m=(0.0, 0.0, 2.4), target_m=(0.0, 0.0, 0.0)),
     "oblique": CameraPoseConfig(eye_m=(0.0, -1.9, 1.9), target_m=(0.0, 0.0, 0.0)),
 }
-SIZES_PX = ((640, 480), (1280, 720))
+SIZES_PX = ((640, 480), (1280, 720), (1920, 1080))
 SPEED_M_S = 0.5
 HALF_AXES_M = (0.60, 0.30)
 GROSS_M, GROSS_RAD = 0.02, math.radians(5.0)

@@ -82,6 +82,7 @@ class Kernel {
 
  private:
   void step();
+  void coast(std::int64_t t_us);
   void follow_reset_line();
   void set_drive();
   void integrate();

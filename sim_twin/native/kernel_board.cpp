@@ -131,4 +131,10 @@ void HostBoard::advance_to(std::int64_t t_us, double battery_v) {
   edges_done_ = 0;
 }
 
+std::int64_t HostBoard::quiet_until_us() const {
+  if (held_) return 0;
+  const auto due_us = static_cast<std::int64_t>(next_us_);
+  return received_.empty() ? due_us : std::min(due_us, received_.front().t_us);
+}
+
 }  // namespace twin

@@ -36,6 +36,8 @@ class BoardSide {
   virtual void receive(std::int64_t t_us, std::string bytes) = 0;
   // Run to t_us with the battery at this voltage.
   virtual void advance_to(std::int64_t t_us, double battery_v) = 0;
+  // Before this nothing is due on the board, unless an edge or bytes come; what is not known is now.
+  virtual std::int64_t quiet_until_us() const { return 0; }
   // Share of the battery voltage on a motor (0 left, 1 right), -1..1.
   virtual double duty(int side) const = 0;
   // What the UART has sent; t_us is the time its last byte left. Emptied by the caller.
@@ -57,6 +59,7 @@ class HostBoard final : public BoardSide {
   void edge(const PinEdge& edge) override { edges_.push_back(edge); }
   void receive(std::int64_t t_us, std::string bytes) override;
   void advance_to(std::int64_t t_us, double battery_v) override;
+  std::int64_t quiet_until_us() const override;
   double duty(int side) const override { return duty_[side]; }
 
  private:

@@ -86,13 +86,8 @@ void Plant::reset(double x_m, double y_m, double theta_rad) {
   x_[kCharge] = p_.battery_charge_start_ratio;
 }
 
-double Plant::battery_v(const Drive& drive, double sag_v) const {
-  return battery_v(x_[kCharge], draw_a(Pair{x_[kCurrentL], x_[kCurrentR]}, drive), sag_v);
-}
-
-double Plant::charge_after(double h_s, const Drive& drive) const {
-  const Pair current_a = {x_[kCurrentL], x_[kCurrentR]};
-  return x_[kCharge] - h_s * d_.per_charge * draw_a(current_a, drive);
+Pair Plant::rolling(double eta1, double w) const {
+  return (eta1 + Pair{-0.5, 0.5} * p_.track_m * w) * d_.per_radius;
 }
 
 // The bridge draws duty * current from the battery (power in = power out, drop taken at the motor).
@@ -106,6 +101,15 @@ double Plant::battery_v(double charge_ratio, double draw_a, double sag_v) const 
   return std::max(open_v - p_.battery_resistance_ohm * draw_a - sag_v, 0.0);
 }
 
+double Plant::battery_v(const Drive& drive, double sag_v) const {
+  return battery_v(x_[kCharge], draw_a(Pair{x_[kCurrentL], x_[kCurrentR]}, drive), sag_v);
+}
+
+double Plant::charge_after(double h_s, const Drive& drive) const {
+  const Pair current_a = {x_[kCurrentL], x_[kCurrentR]};
+  return x_[kCharge] - h_s * d_.per_charge * draw_a(current_a, drive);
+}
+
 // Torque of a brake: against the motion, with the soft middle of all friction here; softer for a strong
 // one, so that it is never stiffer than kStiffest.
 double Plant::brake(double torque_n_m, double omega_rad_s) const {
@@ -116,6 +120,7 @@ double Plant::brake(double torque_n_m, double omega_rad_s) const {
 }
 
 // Motor, bridge and gear of both sides (2.11).
+template <bool kPlain>
 Plant::Sides Plant::sides(Pair current_a, Pair omega_rad_s, const Drive& drive, const LoadVector& load,
                           double battery_v) const {
   const Pair channel_a = p_.motor_per_side * current_a;
@@ -130,12 +135,16 @@ Plant::Sides Plant::sides(Pair current_a, Pair omega_rad_s, const Drive& drive, 
                            (p_.motor_stiction_n_m - p_.motor_coulomb_n_m) / (1.0 + ratio * ratio) +
                            (1.0 - p_.motor_gear_efficiency_ratio) * magnitude(gear_n_m);
   const Pair friction_n_m = sign * coulomb_n_m + p_.motor_viscous_n_m_s_rad * omega_rad_s;
-  const Pair brake_n_m = {brake(load[kBrakeLeft], omega_rad_s[0]), brake(load[kBrakeRight], omega_rad_s[1])};
   Sides out;
   out.current_dot = d_.per_inductance * (drive.duty * battery_v - drop_v - d_.emf_v_s * omega_rad_s -
                                          p_.motor_resistance_ohm * current_a);
-  out.torque_n_m = p_.motor_per_side * (gear_n_m - friction_n_m) - drive.jam * omega_rad_s -
-                   Pair{load[kLoadLeft], load[kLoadRight]} - brake_n_m;
+  out.torque_n_m = p_.motor_per_side * (gear_n_m - friction_n_m);
+  if (!kPlain) {
+    const Pair brake_n_m = {brake(load[kBrakeLeft], omega_rad_s[0]),
+                            brake(load[kBrakeRight], omega_rad_s[1])};
+    out.torque_n_m =
+        out.torque_n_m - drive.jam * omega_rad_s - Pair{load[kLoadLeft], load[kLoadRight]} - brake_n_m;
+  }
   out.rolling_sign = sign;
   return out;
 }
@@ -146,35 +155,43 @@ Plant::Heading Plant::heading(double theta_rad) { return {std::cos(theta_rad), s
 // fraction of the functions' cost.
 Plant::Heading Plant::turned(const Heading& from, double by_rad) {
   const double d2 = by_rad * by_rad;
-  double less = d2 * (0.5 - d2 * (1.0 / 24.0 - d2 * (1.0 / 720.0)));  // 1 - cos
-  double s = by_rad * (1.0 - d2 * (1.0 / 6.0 - d2 * (1.0 / 120.0)));
-  if (!(d2 < 1e-5)) less = 1.0 - std::cos(by_rad), s = std::sin(by_rad);
+  if (!(d2 < 1e-5)) return turned_far(from, by_rad);
+  const double less = d2 * (0.5 - d2 * (1.0 / 24.0 - d2 * (1.0 / 720.0)));  // 1 - cos
+  const double s = by_rad * (1.0 - d2 * (1.0 / 6.0 - d2 * (1.0 / 120.0)));
+  return {from.cos - (from.cos * less + from.sin * s), from.sin - (from.sin * less - from.cos * s)};
+}
+
+Plant::Heading Plant::turned_far(const Heading& from, double by_rad) {
+  const double less = 1.0 - std::cos(by_rad), s = std::sin(by_rad);
   return {from.cos - (from.cos * less + from.sin * s), from.sin - (from.sin * less - from.cos * s)};
 }
 
 StateVector Plant::derivative(const StateVector& x, const Drive& drive, const LoadVector& load) const {
-  return listed(derivative(paired(x), heading(x[kTheta]), drive, load));
+  return listed(derivative<false>(paired(x), heading(x[kTheta]), drive, load));
 }
 
+template <bool kPlain>
 PairedState Plant::derivative(const PairedState& x, const Heading& at, const Drive& drive,
                               const LoadVector& load) const {
   const double drawn_a = draw_a(x[kCurrent], drive);
   const double supply_v = battery_v(x[kBattery][0], drawn_a, load[kBatterySag]);
-  const Sides both = sides(x[kCurrent], x[kOmega], drive, load, supply_v);
+  const Sides both = sides<kPlain>(x[kCurrent], x[kOmega], drive, load, supply_v);
   const double c = at.cos, s = at.sin;
+  const double eta1 = x[kEta][0], eta2 = x[kEta][1];
   // Weight along the floor, body frame, small-angle floor (loads on the axles unchanged).
   const double gx = -kGravity * load[kSlopeX], gy = -kGravity * load[kSlopeY];
   const double gravity[2] = {c * gx + s * gy, c * gy - s * gx};
 
   Acceleration acc{0.0, 0.0, 0.0, Pair{0.0, 0.0}};
-  if (p_.lifted) {
+  if (kPlain) {
+    acc = constrained<true>(x, both, load, gravity);
+  } else if (p_.lifted) {
     acc = hanging(both);
   } else if (p_.slip) {
     acc = slipping(x, both, load, gravity);
   } else {
-    acc = constrained(x, both, load, gravity);
+    acc = constrained<false>(x, both, load, gravity);
   }
-  const double eta1 = x[kEta][0], eta2 = x[kEta][1];
   return {Pair{c * eta1 - s * eta2, s * eta1 + c * eta2},
           Pair{x[kTurn][1], acc.theta_ddot},
           Pair{acc.eta1_dot, acc.eta2_dot},
@@ -186,38 +203,41 @@ PairedState Plant::derivative(const PairedState& x, const Heading& at, const Dri
 
 // Rolling wheels and eta2 = -d0 theta_dot: (S'MS) eta_dot = S'(G tau - F - M S_dot eta), written
 // for (eta1, theta_dot), with the inertia of wheels and rotors in both.
+template <bool kPlain>
 Plant::Acceleration Plant::constrained(const PairedState& x, const Sides& both, const LoadVector& load,
                                        const double* gravity) const {
   const double m = p_.mass_kg, half = 0.5 * p_.track_m, d0 = p_.d0_m;
   const double w = x[kTurn][1], eta1 = x[kEta][0], eta2 = x[kEta][1];
+  const double grip_ratio = kPlain ? 1.0 : grip(load);
   const Pair rim_n =
-      both.torque_n_m * d_.per_radius - grip(load) * d_.roll_n * both.rolling_sign;  // left, right
+      both.torque_n_m * d_.per_radius - grip_ratio * d_.roll_n * both.rolling_sign;  // left, right
 
   const Pair axle_m = {p_.front_axle_m, -p_.rear_axle_m};
-  const Pair slide_n = grip(load) * Pair{d_.slide_front_n, d_.slide_rear_n} *
+  const Pair slide_n = grip_ratio * Pair{d_.slide_front_n, d_.slide_rear_n} *
                        soft_sign(eta2 + axle_m * w, p_.floor_smoothing_m_s);
   const double lateral_n = sum(slide_n);           // F_y
   const double scrub_n_m = sum(axle_m * slide_n);  // in M_r
 
-  const double push_x = load[kForceForward] + m * gravity[0];
-  const double push_y = load[kForceLeft] + m * gravity[1];
+  double forward_n = sum(rim_n), turn_n_m = half * (rim_n[1] - rim_n[0]) - scrub_n_m, left_n = lateral_n;
+  if (!kPlain) {
+    forward_n += load[kForceForward] + m * gravity[0];
+    turn_n_m += load[kTorqueYaw];
+    left_n -= load[kForceLeft] + m * gravity[1];
+  }
   Acceleration acc;
-  acc.eta1_dot = (sum(rim_n) + push_x + m * eta2 * w) * d_.per_mass_rim + load[kAccForward];
-  double moment =
-      half * (rim_n[1] - rim_n[0]) - scrub_n_m + load[kTorqueYaw] + d0 * (lateral_n - push_y + m * eta1 * w);
+  // Adding 0 is not nothing: it makes -0 that which it would be with forces of 0 before.
+  acc.eta1_dot = (forward_n + m * eta2 * w) * d_.per_mass_rim + (kPlain ? 0.0 : load[kAccForward]);
+  double moment = turn_n_m + d0 * (left_n + m * eta1 * w);
   if (p_.castor) {
-    const Pair drag_n = castor_drag(x, grip(load), p_.floor_smoothing_m_s);
+    const Pair drag_n = castor_drag(x, grip_ratio, p_.floor_smoothing_m_s);
     acc.eta1_dot -= drag_n[0] * d_.per_mass_rim;
     moment += (d0 + p_.rear_axle_m) * drag_n[1];  // on the arm from the point without lateral speed
   }
-  acc.theta_ddot = moment * d_.per_inertia_rim + load[kAccYaw] - load[kAccLateral] / d0;
+  acc.theta_ddot = moment * d_.per_inertia_rim + (kPlain ? 0.0 : load[kAccYaw]);
+  if (!kPlain) acc.theta_ddot -= load[kAccLateral] / d0;
   acc.eta2_dot = -d0 * acc.theta_ddot;
   acc.omega_dot = rolling(acc.eta1_dot, acc.theta_ddot);
   return acc;
-}
-
-Pair Plant::rolling(double eta1, double w) const {
-  return (eta1 + Pair{-0.5, 0.5} * p_.track_m * w) * d_.per_radius;
 }
 
 // Four Coulomb contacts: each pushes against the slip velocity of its patch, so that sliding
@@ -270,13 +290,19 @@ Plant::Acceleration Plant::hanging(const Sides& both) const {
 
 void Plant::step(double h_s, const Drive& drive, const LoadVector& begin, const LoadVector& middle,
                  const LoadVector& end) {
+  advance<false>(h_s, drive, begin, middle, end);
+}
+
+template <bool kPlain>
+void Plant::advance(double h_s, const Drive& drive, const LoadVector& begin, const LoadVector& middle,
+                    const LoadVector& end) {
   rest_.holds = false;
   const PairedState x = paired(x_);
   const Heading at = heading(x_[kTheta]);
   const auto slope = [&](const PairedState& there, const LoadVector& load) {
-    return derivative(there, turned(at, there[kTurn][0] - x_[kTheta]), drive, load);
+    return derivative<kPlain>(there, turned(at, there[kTurn][0] - x_[kTheta]), drive, load);
   };
-  const PairedState k1 = derivative(x, at, drive, begin);
+  const PairedState k1 = derivative<kPlain>(x, at, drive, begin);
   const PairedState k2 = slope(moved(x, 0.5 * h_s, k1), middle);
   const PairedState k3 = slope(moved(x, 0.5 * h_s, k2), middle);
   const PairedState k4 = slope(moved(x, h_s, k3), end);
@@ -284,7 +310,7 @@ void Plant::step(double h_s, const Drive& drive, const LoadVector& begin, const 
   for (int i = 0; i < kPairs; ++i) {
     next[i] = x[i] + h_s / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
   }
-  if (!p_.slip && !p_.lifted) {  // keeps rounding from adding up; the slopes agree already
+  if (kPlain || (!p_.slip && !p_.lifted)) {  // keeps rounding from adding up; the slopes agree already
     next[kEta][1] = -p_.d0_m * next[kTurn][1];
     next[kOmega] = rolling(next[kEta][0], next[kTurn][1]);
   }
@@ -293,23 +319,32 @@ void Plant::step(double h_s, const Drive& drive, const LoadVector& begin, const 
   x_ = listed(next);
 }
 
-// Whether a step at this drive left everything but the charge as it was, to the bit. The charge acts
-// through duty times voltage alone, which is nothing while both motors are off.
-bool Plant::is_rest(const StateVector& before, const Drive& drive) const {
+// Whether a step with both motors off left everything but the charge as it was, to the bit. The charge acts
+// through duty times voltage alone, which is nothing then.
+bool Plant::is_rest(const StateVector& before) const {
   static_assert(kCharge == kStates - 1, "the charge is compared with nothing");
-  if (drive.duty[0] != 0.0 || drive.duty[1] != 0.0 || x_[kOmegaL] != 0.0) return false;
+  if (x_[kOmegaL] != 0.0) return false;
   return std::memcmp(before.data(), x_.data(), kCharge * sizeof(double)) == 0;
+}
+
+bool Plant::rests(double h_s, const Drive& drive) const {
+  return rest_.holds && rest_.h_s == h_s && std::memcmp(&rest_.drive, &drive, sizeof drive) == 0;
 }
 
 void Plant::step(double h_s, const Drive& drive) {
   constexpr LoadVector kNone{};
-  if (rest_.holds && rest_.h_s == h_s && std::memcmp(&rest_.drive, &drive, sizeof drive) == 0) {
-    x_[kCharge] += rest_.charge_change;
+  if (rests(h_s, drive)) {
+    rest_on();
     return;
   }
-  const StateVector before = x_;
-  step(h_s, drive, kNone, kNone, kNone);
-  if (!is_rest(before, drive)) return;
+  const bool off = drive.duty[0] == 0.0 && drive.duty[1] == 0.0;
+  const StateVector before = off ? x_ : StateVector{};
+  if (!p_.slip && !p_.lifted && drive.jam[0] == 0.0 && drive.jam[1] == 0.0) {
+    advance<true>(h_s, drive, kNone, kNone, kNone);
+  } else {
+    advance<false>(h_s, drive, kNone, kNone, kNone);
+  }
+  if (!off || !is_rest(before)) return;
   // All four slopes are the same: the current drawn does not change.
   const double k = -d_.per_charge * draw_a(Pair{x_[kCurrentL], x_[kCurrentR]}, drive);
   rest_ = {true, h_s, h_s / 6.0 * (k + 2.0 * (k + k) + k), drive};

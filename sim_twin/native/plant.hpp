@@ -122,6 +122,10 @@ class Plant {
   // with the same result to the bit.
   void step(double h_s, const Drive& drive);
 
+  // Whether a step without loads would change nothing but the charge, by what rest_on adds to it.
+  bool rests(double h_s, const Drive& drive) const;
+  void rest_on() { x_[kCharge] += rest_.charge_change; }
+
   const StateVector& state() const { return x_; }
   StateVector& changed_state() {  // to be written to
     rest_.holds = false;
@@ -141,6 +145,9 @@ class Plant {
     double eta1_dot, eta2_dot, theta_ddot;  // m/s^2, m/s^2, rad/s^2, body frame
     Pair omega_dot;                         // rad/s^2
   };
+  // Each with and without what acts from outside (`load`, jams): a rolling robot's steps are mostly without,
+  // and every term that is known to be 0 lengthens the chain of results that wait for each other.
+  template <bool kPlain>
   TWIN_INLINE Sides sides(Pair current_a, Pair omega_rad_s, const Drive& drive, const LoadVector& load,
                           double battery_v) const;
   // Quotients that do not change, because a division costs as much as ten products.
@@ -161,26 +168,32 @@ class Plant {
 
   static Derived derive(const PlantParams& p);
   static Heading heading(double theta_rad);
-  static Heading turned(const Heading& from, double by_rad);
-  double battery_v(double charge_ratio, double draw_a, double sag_v) const;
-  double draw_a(Pair current_a, const Drive& drive) const;  // from the battery
+  TWIN_INLINE static Heading turned(const Heading& from, double by_rad);
+  [[gnu::cold, gnu::noinline]] static Heading turned_far(const Heading& from, double by_rad);
+  TWIN_INLINE double battery_v(double charge_ratio, double draw_a, double sag_v) const;
+  TWIN_INLINE double draw_a(Pair current_a, const Drive& drive) const;  // from the battery
   TWIN_INLINE double brake(double torque_n_m, double omega_rad_s) const;
+  template <bool kPlain>
+  void advance(double h_s, const Drive& drive, const LoadVector& begin, const LoadVector& middle,
+               const LoadVector& end);
+  template <bool kPlain>
   TWIN_INLINE PairedState derivative(const PairedState& x, const Heading& at, const Drive& drive,
                                      const LoadVector& load) const;
+  template <bool kPlain>
   TWIN_INLINE Acceleration constrained(const PairedState& x, const Sides& both, const LoadVector& load,
                                        const double* gravity) const;
   Acceleration slipping(const PairedState& x, const Sides& both, const LoadVector& load,
                         const double* gravity) const;
   Acceleration hanging(const Sides& both) const;
   Pair castor_drag(const PairedState& x, double grip_ratio, double v_s) const;
-  Pair rolling(double eta1, double w) const;  // wheel speeds, or their rates from the body's
+  TWIN_INLINE Pair rolling(double eta1, double w) const;  // wheel speeds, or their rates from the body's
 
   struct Rest {  // a step that changed nothing but the charge
     bool holds = false;
     double h_s = 0.0, charge_change = 0.0;
     Drive drive;
   };
-  bool is_rest(const StateVector& before, const Drive& drive) const;
+  bool is_rest(const StateVector& before) const;
 
   PlantParams p_;
   Derived d_;

@@ -1,6 +1,8 @@
 """Frame sources: stamps, stalls, stale frames, files that are damaged or cut off."""
 
 import re
+import select
+import socket
 import threading
 import time
 
@@ -10,8 +12,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from hil.config.camera import CameraConfig
 from hil.core.errors import BadInput, RigFault
-from hil.rigs.frames import open_source
+from hil.core.rig import Frame
+from hil.rigs.frames import controls_of, encode_frame, open_source
 from vision import cv_compat
 from vision.camera_watch import FrameWatch
 from vision.sources import CameraControls, ImageFolder, LiveCamera, VideoFile
@@ -239,6 +243,57 @@ def test_a_camera_that_cannot_do_what_is_asked():
     assert capture.released
     with pytest.raises(RigFault, match="camera 97"):
         open_source("97")
+
+
+def test_a_runs_camera_section_sets_the_camera():
+    """`[camera.controls]` beside size and rate: exposure is set, raw pictures asked for; none, nothing."""
+    section = CameraConfig.model_validate({
+        "width_px": 64, "height_px": 64, "rate_hz": 50.0,
+        "controls": {"exposure": 80.0, "white_balance_k": 5000.0, "raw": True},
+    })  # fmt: skip
+    asked = controls_of(section)
+    assert (asked.width_px, asked.height_px, asked.rate_hz) == (64, 64, 50.0)
+    capture = FakeCapture()
+    capture.dropped = {cv2.CAP_PROP_WB_TEMPERATURE}
+    capture.retrieve = lambda: (True, np.full((64, 64, 3), capture.count % 250, np.uint8))
+    camera = LiveCamera(0, asked, capture)
+    note = take(camera, 1)[0].note
+    camera.close()
+    assert camera.locked["exposure"] == 80.0
+    assert capture.values[cv2.CAP_PROP_FOURCC] == cv2.VideoWriter.fourcc(*"YUYV")
+    assert "white_balance_k: 5000 asked for, 4100 in force" in note
+    assert controls_of(None) == CameraControls()
+    with pytest.raises(ValueError, match="exposure"):
+        CameraConfig.model_validate({"controls": {"exposure": 1e9}})
+
+
+def test_pictures_of_another_size_than_the_lens_are_refused(tmp_path):
+    """A camera that delivers other pictures than its driver says; a film, and a socket, of another size."""
+    capture = FakeCapture()
+    camera = LiveCamera(0, capture=capture)
+    take(camera, 2)
+    capture.retrieve = lambda: (True, np.full((96, 128, 3), capture.count % 250, np.uint8))
+    with pytest.raises(RigFault, match="128 x 96 px came, its driver says 64 x 48 px"):
+        take(camera, 50)
+    camera.close()
+    write_video(tmp_path / "film.avi", 3)
+    lens = CameraConfig(width_px=640, height_px=480)
+    with pytest.raises(BadInput, match="160 x 120 px, the lens is that of 640 x 480 px"):
+        open_source(str(tmp_path / "film.avi"), lens)
+    open_source(
+        str(tmp_path / "film.avi"), lens.model_copy(update={"width_px": 160, "height_px": 120})
+    ).close()
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as server:
+        server.bind(str(tmp_path / "camera"))
+        server.listen(1)
+        source = open_source(f"twin:{tmp_path / 'camera'}", lens)
+        peer, _ = server.accept()
+        peer.sendall(encode_frame(Frame(0, 0.0, np.zeros((120, 160, 3), np.uint8))))
+        assert select.select([source.fileno()], [], [], 5.0)[0]
+        with pytest.raises(RigFault, match="160 x 120 px"):
+            source.poll()
+        source.close()
+        peer.close()
 
 
 def write_video(path, count=20):

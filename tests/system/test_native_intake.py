@@ -1,7 +1,7 @@
-"""The two ways in which a run takes in what arrives give the same run to the bit.
+"""The three ways in which a run in memory may advance give the same run to the bit.
 
-From arrival to arrival in native code; or step by step in Python, which every other rig, estimator and
-record needs.
+All its ticks in native code; from arrival to arrival in native code and tick by tick in Python, which a law
+or a reference of somebody's own needs; or step by step in Python, as other rigs, estimators and records do.
 """
 
 import gc
@@ -18,7 +18,8 @@ from hypothesis import strategies as st
 from hil.board.wheel_laws import WHEEL_LAWS
 from hil.config.fit import board_parameters
 from hil.config.load import load_scenario
-from hil.control.laws.making import make_law
+from hil.control.laws import chain
+from hil.control.laws.making import make_law, make_outer_law
 from hil.core import _native as core_native
 from hil.core.clocks import CameraClock
 from hil.record.memory import MemoryRecorder
@@ -49,8 +50,10 @@ FAULTS = {
 }
 CASES = st.fixed_dictionaries(
     {
-        "scenario": st.sampled_from(["scenario-1", "scenario-2", "scenario-3", "circle"]),
-        "outer": st.sampled_from(["asg-ism", "pid", "backstepping", "super-twisting"]),
+        "scenario": st.sampled_from(
+            ["scenario-1", "scenario-2", "scenario-3", "circle", "figure-eight", "stop-and-go"]
+        ),
+        "outer": st.sampled_from(["asg-ism", "pid", "super-twisting", "dob-pid"]),
         "inner": st.sampled_from(sorted(WHEEL_LAWS)),
         "fault": st.sampled_from(sorted(FAULTS)),
         "loss": st.sampled_from([0.0, 0.05]),
@@ -87,32 +90,53 @@ def spec_of(case):
     return RunSpec(scenario, "twin", "pose", case["outer"], case["inner"], case["seed"], Path())
 
 
-def run(case, make_pump):
-    """Return the record of a case with the intake that `make_pump` gives."""
+def parts_of(spec):
+    """Return the parts of a session over the twin, recorded in memory."""
+    rig = open_rig("twin", spec.scenario, "pose", spec.seed)
+    parameters = board_parameters(spec.scenario, spec.inner)
+    sink = MemoryRecorder(make_manifest(spec, parameters, used_things(spec)))
+    return make_parts(spec, rig, sink, make_law(spec.outer, spec.scenario))
+
+
+def run(case, make_pump, make_drive):
+    """Return the record of a case with the intake and the ticks that these give."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(session, "make_pump", make_pump)
+        patch.setattr(session, "make_drive", make_drive)
         return execute_in_memory(spec_of(case))
 
 
-def in_native(case):
-    """Return the record of a case taken in by native code, which it must be."""
-    made = []
+def noted(make, made):
+    """Return a maker that notes what it gives."""
 
-    def make_pump(*parts):
-        made.append(REAL(*parts))
+    def noting(*parts):
+        made.append(make(*parts))
         return made[-1]
 
-    record = run(case, make_pump)
-    assert made[0] is not None
+    return noting
+
+
+def in_native(case):
+    """Return the record of a case that advances in native code, as it must."""
+    pumps, drives = [], []
+    record = run(case, noted(REAL, pumps), noted(REAL_DRIVE, drives))
+    assert pumps[0] is not None
+    if any(event.kind == "armed" for event in record.events):
+        assert drives[0] is not None
     return record
+
+
+def by_ticks(case):
+    """Return the record of a case taken in by native code, whose ticks are Python's."""
+    return run(case, REAL, lambda *_: None)
 
 
 def in_python(case):
     """Return the record of a case taken in by Python."""
-    return run(case, lambda *_: None)
+    return run(case, lambda *_: None, REAL_DRIVE)
 
 
-REAL = session.make_pump
+REAL, REAL_DRIVE = session.make_pump, session.make_drive
 
 
 def differences(one, other):
@@ -137,16 +161,20 @@ def differences(one, other):
 
 @settings(max_examples=25, deadline=None)
 @given(CASES)
-def test_both_ways_give_the_same_run(case):
+def test_all_ways_give_the_same_run(case):
     """Samples, frames, events, counters, outcome and figures are equal to the bit, whatever is drawn."""
-    assert differences(in_native(case), in_python(case)) == []
+    native = in_native(case)
+    assert differences(native, in_python(case)) == []
+    assert differences(native, by_ticks(case)) == []
 
 
 @pytest.mark.parametrize("fault", sorted(FAULTS))
-def test_both_ways_give_the_same_run_under_each_fault(fault):
+def test_all_ways_give_the_same_run_under_each_fault(fault):
     """The same for each fault by itself; one that ends the run ends it with the same words."""
     case = ONE | {"fault": fault}
-    assert differences(in_native(case), in_python(case)) == []
+    native = in_native(case)
+    assert differences(native, in_python(case)) == []
+    assert differences(native, by_ticks(case)) == []
 
 
 def test_the_comparison_sees_a_changed_constant():
@@ -156,8 +184,76 @@ def test_the_comparison_sees_a_changed_constant():
         latency_s = spec_of(ONE).scenario.camera.latency_s + 1e-6
         return REAL(replace(parts, camera_clock=CameraClock(latency_s)), watch, note)
 
-    changed = differences(run(ONE, make_pump), in_python(ONE))
+    changed = differences(run(ONE, make_pump, REAL_DRIVE), in_python(ONE))
     assert {"samples.est_x_m", "frames.t_exposure_s", "figures"} <= set(changed)
+
+
+def test_the_comparison_sees_a_changed_law():
+    """With a gain off by its last bit in the native ticks alone the runs differ (negative control)."""
+
+    def make_drive(parts, *rest):
+        scenario = spec_of(ONE).scenario
+        gains = scenario.control.active_gains
+        own = gains.asg_ism
+        other = own.model_copy(update={"k1_s": math.nextafter(own.k1_s, math.inf)})
+        d0_m, limits = scenario.robot.d0_m, scenario.control.limits
+        law = make_outer_law("asg-ism", gains.model_copy(update={"asg_ism": other}), limits, d0_m)
+        beneath = make_parts(spec_of(ONE), parts.rig, parts.recorder, law)
+        changed = replace(parts, law=beneath.law)
+        return REAL_DRIVE(changed, *rest)
+
+    changed = differences(run(ONE, REAL, make_drive), in_python(ONE))
+    # Set-points go out in 32 bits: the robot itself need not notice.
+    assert {"samples.eta1_cmd_m_s", "samples.v1_m_s3"} <= set(changed)
+
+
+@pytest.mark.parametrize(
+    ("what", "more"),
+    [
+        ("axes of its own", ["control.axes_rad=0.3"]),
+        ("a longer lead", ["control.limits.lead_s=0.1"]),
+    ],
+)
+def test_a_law_asked_in_python_gives_the_same_run(what, more):
+    """A law that is not translated, with names of its own in the record, is asked from native code."""
+    scenario = load_scenario("scenario-1", ["duration_s=1.5", *more])
+    spec = replace(spec_of(ONE), outer="asg-ism-implicit", scenario=scenario)
+    drives = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(session, "make_drive", noted(REAL_DRIVE, drives))
+        native = execute_in_memory(spec)
+        patch.setattr(session, "make_drive", lambda *_: None)
+        by_hand = execute_in_memory(spec)
+    assert drives[0] is not None, what
+    assert not np.isnan(native.samples["slide_x_m_s3"]).all()
+    assert differences(native, by_hand) == []
+
+
+def test_a_replaced_function_is_called():
+    """Whoever replaces a function of the laws gets all ticks in Python, where it is called."""
+    drives, seen = [], []
+    right = chain.clip
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(session, "make_drive", noted(REAL_DRIVE, drives))
+        patch.setattr(chain, "clip", lambda *values: seen.append(values) or right(*values))
+        record = execute_in_memory(spec_of(ONE))
+    assert drives == [None]
+    assert len(seen) > record.manifest.tick_count > 30
+
+
+def test_who_steps_a_session_sees_each_tick_of_the_same_run():
+    """A caller that steps gets every situation; the run is that which nobody looks at."""
+    spec = spec_of(ONE)
+    parts = parts_of(spec)
+    stepped = Session(
+        spec.scenario, parts, board_parameters(spec.scenario, spec.inner), board_hashes
+    )
+    situations = list(stepped.steps())
+    record = parts.recorder.close(stepped.ending.outcome, stepped.ending.detail)
+    whole = in_native(ONE)
+    assert len(situations) == whole.manifest.tick_count == 61
+    for name, values in whole.samples.items():
+        assert np.asarray(values).tobytes() == np.asarray(record.samples[name]).tobytes(), name
 
 
 @pytest.mark.parametrize(
@@ -181,14 +277,11 @@ def test_what_native_code_cannot_do_is_left_to_python(what, more):
 def test_a_session_with_native_parts_is_forgotten_after_its_run():
     """Native parts keep no way back to their session: a campaign would keep every run."""
     spec = spec_of(ONE)
-    rig = open_rig("twin", spec.scenario, "pose", spec.seed)
-    parameters = board_parameters(spec.scenario, spec.inner)
-    sink = MemoryRecorder(make_manifest(spec, parameters, used_things(spec)))
-    parts = make_parts(spec, rig, sink, make_law(spec.outer, spec.scenario))
-    session = Session(spec.scenario, parts, parameters, board_hashes)
-    assert session.run().outcome == "complete"
-    kept = [weakref.ref(session), weakref.ref(rig)]
-    del session, parts, rig
+    parts = parts_of(spec)
+    ran = Session(spec.scenario, parts, board_parameters(spec.scenario, spec.inner), board_hashes)
+    assert ran.run().outcome == "complete"
+    kept = [weakref.ref(ran), weakref.ref(parts.rig)]
+    del ran, parts
     gc.collect()
     assert [ref() for ref in kept] == [None, None]
 

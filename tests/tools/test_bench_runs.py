@@ -43,7 +43,7 @@ def test_batch_says_runs_and_times_real_time_of_each_path() -> None:
     assert done.json["program"].startswith("skid-steer-hil ")
     assert done.json["machine"]["cores"] >= 1
     found = {(item["name"], item["unit"]): item for item in done.json["figures"]}
-    assert len(found) == 13  # both ways of the pose camera, two tasks; rendered; plant and kernel
+    assert len(found) == 17  # three ways of the pose camera, two tasks; rendered; plant and kernel
     assert ("the same, taken in by Python", "x real time") in found
     for item in found.values():
         assert len(item["values"]) == item["runs"] == 3
@@ -57,9 +57,10 @@ def test_batch_says_runs_and_times_real_time_of_each_path() -> None:
 def test_the_simulated_time_of_a_run_is_that_of_its_rig() -> None:
     """Connecting, the controlled part and stopping; the same whoever takes in what arrives."""
     scenario = bench_runs.load_scenario("scenario-1", ["duration_s=1"])
-    one, other = (bench_runs._simulated(scenario, "pose", "pid", way) for way in (True, False))
+    ways = (bench_runs.NATIVE, bench_runs.ASKED, bench_runs.PYTHON)
+    one, *others = (bench_runs._simulated(scenario, "pose", "pid", way) for way in ways)
     assert 1.0 < one < 3.0
-    assert one == other
+    assert others == [one, one]
 
 
 def test_the_campaign_is_the_built_in_one_with_fewer_runs() -> None:
@@ -117,7 +118,7 @@ def test_against_a_file_of_this_command_compares_and_any_other_is_refused(tmp_pa
     file.write_text(json.dumps(hil("bench", "batch", "--runs", 2, "--json").json), encoding="utf-8")
     done = hil("bench", "batch", "--runs", 2, "--against", file, "--json")
     assert done.status == 0
-    assert len(done.json["against"]) == 13
+    assert len(done.json["against"]) == 17
     assert all(item["low"] <= item["ratio"] * 1.001 for item in done.json["against"])
     assert "now / then" in hil("bench", "batch", "--runs", 1, "--against", file).out
     other = tmp_path / "other.json"

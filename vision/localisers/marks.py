@@ -31,12 +31,20 @@ Array = NDArray[np.float64]
 
 # What is accepted.
 SHARE_MIN = 0.4
-GROWTH_MAX = 0.12
+# So little of a rim is enough where it has the known radius within so much.
+SHARE_SURE_MIN, GROWTH_SURE = 0.33, 0.03
+GROWTH_MAX = 0.12  # of a rim that is seen whole; less of one
+GROWTH_CUT = 0.4
 GROWTH_DOUBT = 0.5  # more where the rim is rough: noise, blur longer than the profiles
-RESIDUAL_MAX = 0.09  # of the radius
-RESIDUAL_FREE_PX = 0.25  # sensor noise
+RESIDUAL_MAX = (
+    0.09  # of the radius, for a rim that is seen whole: blur; a cover leaves the rest sharp
+)
+RESIDUAL_FREE_DN = 10.5  # px at a contrast of 1 DN: a sensor's noise
 DISTANCE_TOLERANCE = 0.04
-SQUARE_MAX = 0.6  # of both marks: squares of the same width have 0.66 to 0.9, discs to 0.55
+# Squares of the same width are four-cornered by 0.5 to 0.9 on average of both, discs to 0.6. What is left
+# out of a square's rim are its corners: less is enough where both rims, or one, are not whole.
+SQUARE_MAX, SQUARE_MAX_CUT, SQUARE_MAX_BOTH_CUT = 0.65, 0.52, 0.42
+WHOLE_SHARE = 0.96
 
 # How many degrees of freedom the discs' own claims are worth against that of their distance.
 MISFIT_FREEDOM = 4.0
@@ -214,7 +222,7 @@ class MarkLocaliser:
             why = self._refusal(disc)
             if why:
                 return None, f"{name} mark: {why}"
-        if min(disc.square for disc in discs) > SQUARE_MAX:
+        if _square(discs):
             return None, "both marks have four corners"
         at = self._model.floor_point
         front, rear = (at(disc.u_px, disc.v_px, self._height_m) for disc in discs)
@@ -238,18 +246,22 @@ class MarkLocaliser:
     def _quality(self, found: _Found) -> float:
         """Return the smaller share of rim times how well rims and distance fit; 1 is whole and sharp."""
         share = min(disc.share for disc in found.discs)
-        sharp = max(disc.residual_px / disc.radius_px for disc in found.discs) / QUALITY_RESIDUAL
+        sharp = max(_rough_px(disc) / disc.radius_px for disc in found.discs) / QUALITY_RESIDUAL
         misfit = found.gap_m / (DISTANCE_TOLERANCE * self._distance_m)
         return share * math.exp(-0.5 * sharp**2 - misfit**2)
 
     def _refusal(self, disc: Disc) -> str:
         """Return why a disc cannot be a mark, "" when it can."""
-        if disc.share < SHARE_MIN:
-            return f"{disc.share:.0%} of its rim seen, limit {SHARE_MIN:.0%}"
-        most = GROWTH_MAX + GROWTH_DOUBT * disc.residual_px / disc.radius_px
+        least = SHARE_SURE_MIN if abs(disc.growth) <= GROWTH_SURE else SHARE_MIN
+        if disc.share < least:
+            return f"{disc.share:.0%} of its rim seen, limit {least:.0%}"
+        most = (
+            GROWTH_MAX * (GROWTH_CUT + (1.0 - GROWTH_CUT) * disc.share)
+            + GROWTH_DOUBT * disc.residual_px / disc.radius_px
+        )
         if not abs(disc.growth) <= most:
             return f"{1.0 + disc.growth:.2f} of its size, limit 1 +- {most:.2f}"
-        most_px = RESIDUAL_FREE_PX + RESIDUAL_MAX * disc.radius_px
+        most_px = _free_px(disc) + RESIDUAL_MAX * disc.share**2 * disc.radius_px
         if not disc.residual_px <= most_px:
             return f"rim off by {disc.residual_px:.2f} px RMS, limit {most_px:.2f} px"
         if not disc.ground_ratio <= self._ground_ratio_max:
@@ -318,6 +330,23 @@ def _near(centres_m: Centres, found: _Found, within_m: float) -> bool:
     """Return whether a hypothesis is the one already measured."""
     pairs = zip(centres_m, found.centres_m, strict=True)
     return all(math.dist(a, b) < within_m for a, b in pairs)
+
+
+def _square(discs: Marks) -> bool:
+    """Return whether two marks have four corners each."""
+    cut = sum(disc.share < WHOLE_SHARE for disc in discs)
+    most = (SQUARE_MAX, SQUARE_MAX_CUT, SQUARE_MAX_BOTH_CUT)[cut]
+    return 0.5 * sum(disc.square for disc in discs) > most
+
+
+def _rough_px(disc: Disc) -> float:
+    """Return how far a rim is off its disc beyond a sensor's noise, RMS."""
+    return math.sqrt(max(disc.residual_px**2 - _free_px(disc) ** 2, 0.0))
+
+
+def _free_px(disc: Disc) -> float:
+    """Return how far a noisy sensor's rim is off its disc, RMS: the paler the disc, the more."""
+    return RESIDUAL_FREE_DN / max(disc.contrast_dn, 1.0)
 
 
 def _area_px(disc: Disc) -> float:

@@ -10,23 +10,24 @@ constexpr double kTurn = 6.283185307179586;
 constexpr int kSlowTurns = 8;
 // White noise of pixels, measured on 12 radii from 4 to 32 px: how much more of it moves a centre than
 // is left in `fast`, and how much more is in `odd`; rays share pixels, the more so on a small disc.
-constexpr double kWhiteCentre = 1.52, kWhiteCentrePx = 9.0, kWhiteCentrePower = 3.2;
-constexpr double kWhiteOdd = 1.1, kWhiteOddPx = 8.0, kWhiteOddPower = 2.6;
+constexpr double kWhiteCentre = 1.18, kWhiteCentrePx = 9.5, kWhiteCentrePower = 3.2;
+constexpr double kWhiteOdd = 1.1, kWhiteOddPx = 8.6, kWhiteOddPower = 2.6;
+// Of that, the share of the levels inside, whose first turn is grown where light falls to one side.
+constexpr double kLean = 3.0;
 // Noise beyond that is of patches larger than a pixel (blocks of a JPEG, colour at half resolution,
 // smear): the larger they are, the more of it varies just once, which the fit has taken up.
-constexpr double kPatches = 1.55;
-constexpr double kPatchSlope = 0.35;
+constexpr double kPatches = 2.4;
+constexpr double kPatchSlope = 0.16;
 // Blur leaves what varies twice, alike on both sides; a share of it is not alike.
-constexpr double kTwice = 0.13;
-constexpr double kTwiceFree = 2.0;
-constexpr double kTwiceFreeFast = 3.0;
+constexpr double kTwice = 0.012;
+constexpr double kTwiceFree = 0.8;
+constexpr double kTwiceFreeFast = 1.3;
 // Of a rim of which a share is seen; and with a profile's gain (`Edges::gain`).
-constexpr double kSharePower = 2.3;
-constexpr double kGainPower = 0.85;
-// Error over what other levels would change, squared; changes that noise alone makes do not count.
-constexpr double kGround = 1.3;
-constexpr double kGroundFree = 0.09;
-constexpr double kCover = 42.0;
+constexpr double kSharePower = 0.7;
+constexpr double kGainPower = 0.06;
+// Error over what other levels would change, squared.
+constexpr double kGround = 1.6;
+constexpr double kCover = 80.0;
 // Rounding, where no noise is seen.
 constexpr double kFreePx = 0.002;
 
@@ -59,10 +60,13 @@ double power_of(const Round& values, int turns) {
 // Variance of the noise that moves a centre, px^2 a ray.
 double centre_noise(const Evidence& own, const Evidence& other) {
   const double radius = std::max(own.radius_px, 4.0);
-  const double fast = 0.5 * (own.noise.fast + other.noise.fast);
-  const double odd = 0.5 * (own.noise.odd + other.noise.odd);
+  // Noise is the same in the picture's levels: the paler disc has more of it in its edges.
+  const double paler = other.contrast_dn / std::max(own.contrast_dn, 1.0);
+  const double fast = 0.5 * (own.noise.fast + paler * paler * other.noise.fast);
+  const double odd = 0.5 * (own.noise.odd + paler * paler * other.noise.odd);
   const double twice = 0.5 * (own.noise.twice + other.noise.twice);
-  const double white = kWhiteCentre + std::pow(kWhiteCentrePx / radius, kWhiteCentrePower);
+  const double leant = 1.0 + kLean * own.lean * (2.0 + own.lean);
+  const double white = kWhiteCentre * leant + std::pow(kWhiteCentrePx / radius, kWhiteCentrePower);
   const double white_odd = kWhiteOdd + std::pow(kWhiteOddPx / radius, kWhiteOddPower);
   const double patches = std::max(odd - white_odd * fast, 0.0);
   const double larger = std::pow(1.0 + patches / std::max(fast, 1e-12), kPatchSlope);
@@ -105,12 +109,10 @@ std::array<double, 3> claim(const Evidence& own, const Evidence& other) {
   const auto [uu, uv, vv] = own.covariance_px2;
   const Vec2 g = own.ground_px;
   const Vec2 c = own.cover_px;
-  const double by_noise = kGroundFree * 0.5 * (own.noise.fast + other.noise.fast) * (uu + vv);
-  const double ground = kGround * std::max(1.0 - by_noise / std::max(dot(g, g), 1e-12), 0.0);
   const double free = kFreePx * kFreePx;
-  return {uu * variance + ground * g.x * g.x + kCover * c.x * c.x + free,
-          uv * variance + ground * g.x * g.y + kCover * c.x * c.y,
-          vv * variance + ground * g.y * g.y + kCover * c.y * c.y + free};
+  return {uu * variance + kGround * g.x * g.x + kCover * c.x * c.x + free,
+          uv * variance + kGround * g.x * g.y + kCover * c.x * c.y,
+          vv * variance + kGround * g.y * g.y + kCover * c.y * c.y + free};
 }
 
 }  // namespace vision

@@ -20,7 +20,7 @@ struct Evidence {
   RimNoise noise;
   std::array<double, 3> covariance_px2;
   Vec2 ground_px, cover_px;
-  double radius_px, share, gain;
+  double radius_px, share, gain, contrast_dn, lean;
 };
 
 // `rest` is zero for the rays that are left out; `kept` are in.

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "symmetric.hpp"
+#include "rim_solve.hpp"
 
 namespace vision {
 namespace {
@@ -21,115 +21,17 @@ constexpr double kCentroidLevel = 0.4;  // of the way from the surroundings to t
 // A step this short ends the fit; after one longer than that all rays count again.
 constexpr double kSettledPx = 0.03;
 constexpr double kRekeepPx = 0.5;
-constexpr double kOutlierSigmas = 3.0;
-// Of five rays side by side, more of which must have an edge for that in the middle.
-constexpr int kBesideMin = 3;
-constexpr double kEdgeSigmaMinPx = 0.05;
+// Rays are as close together as they are so far inside, in radii; the least length of one, relative.
+constexpr double kInside = 0.25;
+constexpr double kLengthMin = 0.1;
 constexpr double kOffMax = 0.4;  // of the radius: a square's corners
 // Doubt of the radius before the fit, relative, as a pull towards the known one.
 constexpr double kRadiusSigma = 0.02;
 constexpr double kRadiusPull = (0.15 / kRadiusSigma) * (0.15 / kRadiusSigma);
-
-int count(const Mask& keep) { return static_cast<int>(std::count(keep.begin(), keep.end(), true)); }
-
-Matrix normal(const std::array<Move, kRays>& rows, const Mask& keep) {
-  Matrix n = {};
-  for (int ray = 0; ray < kRays; ++ray) {
-    for (int i = 0; keep[ray] && i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) {
-        n[i][j] += rows[ray][i] * rows[ray][j];
-      }
-    }
-  }
-  n[2][2] += kRadiusPull;
-  return n;
-}
-
-// Usable rays whose levels hold nothing of a cover's: levels are means over neighbouring rays, and two
-// rays side by side that show no edge are something in front; one alone is noise.
-Mask clear_of_cover(const Mask& usable) {
-  Mask clear;
-  for (int ray = 0; ray < kRays; ++ray) {
-    const auto shown = [&](int away) { return usable[(ray + away + kRays) % kRays]; };
-    int beside = 0;
-    for (int k = -2; k <= 2; ++k) {
-      beside += shown(k) ? 1 : 0;
-    }
-    clear[ray] = usable[ray] && beside > kBesideMin;
-    for (int k = -kLevelRays / 2 - 1; k <= kLevelRays / 2; ++k) {
-      clear[ray] = clear[ray] && (shown(k) || shown(k + 1));
-    }
-  }
-  return clear;
-}
-
-// (du, dv, growth) by least squares; none when too little of the rim is left.
-std::optional<Move> solved(const std::array<Move, kRays>& rows, const Round& shift, const Mask& keep) {
-  if (count(keep) < kRays / 6) {
-    return std::nullopt;
-  }
-  const std::optional<Matrix> covariance = inverse(normal(rows, keep));
-  if (!covariance) {
-    return std::nullopt;
-  }
-  Move right = {};
-  for (int ray = 0; ray < kRays; ++ray) {
-    for (int i = 0; keep[ray] && i < 3; ++i) {
-      right[i] += rows[ray][i] * shift[ray];
-    }
-  }
-  return Move{dot3((*covariance)[0], right), dot3((*covariance)[1], right), dot3((*covariance)[2], right)};
-}
-
-// A robust standard deviation of kept residuals: 1.48 of their median.
-double spread(const Round& rest, const Mask& keep) {
-  std::array<double, kRays> kept;
-  int n = 0;
-  for (int ray = 0; ray < kRays; ++ray) {
-    if (keep[ray]) {
-      kept[n++] = rest[ray];
-    }
-  }
-  std::nth_element(kept.begin(), kept.begin() + n / 2, kept.begin() + n);
-  return std::max(1.4826 * kept[n / 2], kEdgeSigmaMinPx);
-}
-
-// (du, dv, growth) without the rays far off the fit, which leave `keep`; `tries` times to find them.
-std::optional<Move> robust(const std::array<Move, kRays>& rows, const Round& shift, const Mask& usable,
-                           int tries, Mask& keep) {
-  for (int i = 0; i < tries; ++i) {
-    const std::optional<Move> move = solved(rows, shift, keep);
-    if (!move) {
-      return std::nullopt;
-    }
-    Round rest;
-    for (int ray = 0; ray < kRays; ++ray) {
-      rest[ray] = std::abs(shift[ray] - dot3(rows[ray], *move));
-    }
-    const double limit = kOutlierSigmas * spread(rest, keep);
-    Mask within;
-    for (int ray = 0; ray < kRays; ++ray) {
-      within[ray] = usable[ray] && rest[ray] < limit;
-    }
-    if (within == keep) {
-      return move;
-    }
-    keep = within;
-  }
-  return solved(rows, shift, keep);
-}
-
-// Where a change of every ray's edge, in samples, moves the centre.
-Vec2 moved(const Matrix& covariance, const std::array<Move, kRays>& rows, const Round& scale,
-           const Mask& keep, const Round& change) {
-  Move right = {};
-  for (int ray = 0; ray < kRays; ++ray) {
-    for (int i = 0; keep[ray] && i < 3; ++i) {
-      right[i] += rows[ray][i] * scale[ray] * change[ray];
-    }
-  }
-  return {dot3(covariance[0], right), dot3(covariance[1], right)};
-}
+// And as one towards that of the other disc, of which more is seen: light, blur and lens grow both alike.
+constexpr double kAlikeSigma = 0.0027;
+constexpr double kAlikeMax = 0.03;  // off it a disc is of another size
+constexpr double kAlikePull = (0.15 / kAlikeSigma) * (0.15 / kAlikeSigma);
 
 }  // namespace
 
@@ -155,14 +57,25 @@ std::optional<RimFitter::Shape> RimFitter::shape(Vec2 px) const {
     reach = std::max({reach, std::abs(found.arms[ray].x), std::abs(found.arms[ray].y)});
   }
   double radius = 0.0;
+  double around = 0.0;
   for (int ray = 0; ray < kRays; ++ray) {
     const Vec2 along = found.arms[(ray + 1) % kRays] - found.arms[(ray + kRays - 1) % kRays];
+    found.length[ray] = std::hypot(along.x, along.y);
+    around += found.length[ray] / kRays;
     // Seen from above a circle keeps its turning sense, and image rows run down.
-    found.normals[ray] = 1.0 / std::hypot(along.x, along.y) * Vec2{-along.y, along.x};
+    found.normals[ray] = 1.0 / found.length[ray] * Vec2{-along.y, along.x};
     radius += dot(found.normals[ray], found.arms[ray]) / kRays;
   }
   if (!(radius > 1.0)) {
     return std::nullopt;
+  }
+  // Rays run together inwards, the more so where the rim is bent more.
+  const double inside = kInside * radius / around;
+  for (int ray = 0; ray < kRays; ++ray) {
+    const Vec2 before = found.normals[(ray + kRays - 1) % kRays];
+    const Vec2 after = found.normals[(ray + 1) % kRays];
+    const double bent = std::abs(before.x * after.y - before.y * after.x);
+    found.length[ray] = std::max(found.length[ray] / around - inside * bent, kLengthMin);
   }
   found.radius_px = radius;
   found.step_px = reach_px(radius) / profiles_.edge();
@@ -225,7 +138,7 @@ Mask RimFitter::within(const Picture& picture, Vec2 px, const Shape& shape) cons
 }
 
 bool RimFitter::step(const Picture& picture, Vec2 px, const Colour& weights, const Mask* keep,
-                     Step& done) const {
+                     const Step* other, Step& done) const {
   const std::optional<Shape> rim = shape(px);
   if (!rim) {
     return false;
@@ -248,13 +161,17 @@ bool RimFitter::step(const Picture& picture, Vec2 px, const Colour& weights, con
     usable[ray] = done.edges.usable[ray] && seen[ray];
   }
   const Mask whole = clear_of_cover(usable);
+  // Where rays are closer together they share more pixels, and each says less.
+  Round precision;
   double information = 0.0;
-  for (const double noise : done.edges.noise) {
-    information += 1.0 / (noise * noise * kRays);
+  for (int ray = 0; ray < kRays; ++ray) {
+    const double noise = done.edges.noise[ray];
+    precision[ray] = rim->length[ray] / (noise * noise);
+    information += precision[ray] / kRays;
   }
   const double scale = 1.0 / std::sqrt(information);
   for (int ray = 0; ray < kRays; ++ray) {
-    const double weight = scale / done.edges.noise[ray];
+    const double weight = scale * std::sqrt(precision[ray]);
     const Vec2 n = rim->normals[ray];
     const double pull = done.edges.gain[ray] * weight;
     done.rows[ray] = {n.x * pull, n.y * pull, dot(n, rim->arms[ray]) * pull};
@@ -265,7 +182,14 @@ bool RimFitter::step(const Picture& picture, Vec2 px, const Colour& weights, con
   for (int ray = 0; keep != nullptr && ray < kRays; ++ray) {
     done.keep[ray] = whole[ray] && (*keep)[ray];
   }
-  const std::optional<Move> move = robust(done.rows, done.shift, whole, keep == nullptr ? 2 : 1, done.keep);
+  done.radius = {0.0, kRadiusPull};
+  const int tries = keep == nullptr ? 2 : 1;
+  std::optional<Move> move = robust(done.rows, done.shift, whole, done.radius, tries, done.keep);
+  const bool less = move && other != nullptr && count(done.keep) < count(other->keep);
+  if (less && std::abs((*move)[2] - other->move[2]) < kAlikeMax) {
+    done.radius = {other->move[2], kAlikePull};
+    move = robust(done.rows, done.shift, whole, done.radius, tries, done.keep);
+  }
   if (move) {
     done.move = *move;
   }
@@ -274,11 +198,13 @@ bool RimFitter::step(const Picture& picture, Vec2 px, const Colour& weights, con
 
 Disc RimFitter::disc(const Picture& picture, const Step& step, Evidence& evidence) const {
   const auto& [du, dv, growth] = step.move;
+  const Mask used = without_short_runs(step.keep);
   Round rest = {};
   Round off;
   std::vector<float> ratios;
   double squares = 0.0;
   double gain = 0.0;
+  int shown = 0;
   const auto brightness = [&](int ray, int first) {
     float sum = 0.0F;
     for (int i = first; i < first + 2; ++i) {
@@ -292,7 +218,8 @@ Disc RimFitter::disc(const Picture& picture, const Step& step, Evidence& evidenc
   for (int ray = 0; ray < kRays; ++ray) {
     const double left = step.shift[ray] - dot3(step.rows[ray], step.move);
     off[ray] = std::clamp(left, -kOffMax * step.shape.radius_px, kOffMax * step.shape.radius_px);
-    if (step.keep[ray]) {
+    shown += step.keep[ray] ? 1 : 0;
+    if (used[ray]) {
       rest[ray] = left;
       squares += rest[ray] * rest[ray];
       gain += step.edges.gain[ray];
@@ -303,19 +230,21 @@ Disc RimFitter::disc(const Picture& picture, const Step& step, Evidence& evidenc
   const int kept = static_cast<int>(ratios.size());
   std::nth_element(ratios.begin(), ratios.begin() + kept / 2, ratios.end());
   const double share = static_cast<double>(kept) / kRays;
-  const Matrix centre = inverse(normal(step.rows, step.keep)).value_or(Matrix{});
+  const Matrix centre = inverse(normal(step.rows, used, step.radius.pull)).value_or(Matrix{});
   evidence = {rim_noise(rest, kept),
               {centre[0][0], centre[0][1], centre[1][1]},
-              moved(centre, step.rows, step.scale, step.keep, step.edges.ground),
-              moved(centre, step.rows, step.scale, step.keep, step.edges.cover),
+              moved(centre, step.rows, step.scale, used, step.edges.ground),
+              moved(centre, step.rows, step.scale, used, step.edges.cover),
               step.shape.radius_px,
               share,
-              gain / kept};
+              gain / kept,
+              step.edges.typical_dn,
+              step.edges.lean};
   return Disc{step.from_px.x + du,
               step.from_px.y + dv,
               step.shape.radius_px,
               growth,
-              share,
+              static_cast<double>(shown) / kRays,
               std::sqrt(squares / kept),
               {},
               step.edges.typical_dn,
@@ -347,7 +276,8 @@ std::optional<std::array<Disc, 2>> RimFitter::fit(const Picture& picture,
   for (int i = 0; i < kSteps; ++i) {
     double far_px = 0.0;
     for (int k = 0; k < 2; ++k) {
-      if (!step(picture, px[k], weights_[k], all_rays ? nullptr : &keep[k], steps[k])) {
+      const Step* other = i + k > 0 ? &steps[1 - k] : nullptr;
+      if (!step(picture, px[k], weights_[k], all_rays ? nullptr : &keep[k], other, steps[k])) {
         return std::nullopt;
       }
       const Move& move = steps[k].move;
@@ -355,7 +285,7 @@ std::optional<std::array<Disc, 2>> RimFitter::fit(const Picture& picture,
       keep[k] = steps[k].keep;
       far_px = std::max({far_px, std::abs(move[0]), std::abs(move[1])});
     }
-    if (far_px < kSettledPx) {
+    if (far_px < kSettledPx && (i > 0 || count(keep[0]) >= count(keep[1]))) {
       break;
     }
     all_rays = far_px > kRekeepPx;

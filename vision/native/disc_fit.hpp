@@ -8,6 +8,7 @@
 #include "camera.hpp"
 #include "claim.hpp"
 #include "picture.hpp"
+#include "rim_solve.hpp"
 #include "rims.hpp"
 #include "symmetric.hpp"
 
@@ -38,6 +39,7 @@ class RimFitter {
   // The rim seen about a pixel: arms from the image of its centre, and normals outwards.
   struct Shape {
     std::array<Vec2, kRays> arms, normals;
+    Round length;  // of rim that a ray stands for; 1 on average
     double radius_px;
     double step_px;  // between the samples of a profile
     double room_px;  // what the profiles need about the centre
@@ -50,12 +52,14 @@ class RimFitter {
     std::array<Move, kRays> rows;
     Round shift, scale;  // `scale`: from samples to the units of `rows`
     Mask keep;
+    RadiusPull radius;
     Move move;
   };
 
   std::optional<Shape> shape(Vec2 px) const;
   std::optional<Vec2> centred(const Picture& picture, Vec2 px, const Colour& weights) const;
-  bool step(const Picture& picture, Vec2 px, const Colour& weights, const Mask* keep, Step& done) const;
+  bool step(const Picture& picture, Vec2 px, const Colour& weights, const Mask* keep, const Step* other,
+            Step& done) const;
   Mask within(const Picture& picture, Vec2 px, const Shape& shape) const;
   // The figures of a fitted disc but for its covariance, and what that rests on.
   Disc disc(const Picture& picture, const Step& step, Evidence& evidence) const;

@@ -8,19 +8,23 @@ namespace vision {
 namespace {
 
 constexpr int kGainRays = 9;  // over which gain and noise are
-// How far from the rim an edge is looked for, and how far beyond that its two levels are taken, in
-// radii. The longer, the more noise gets in; blur at 0.5 m/s over 20 ms is 0.17 each way.
-constexpr std::array<std::pair<double, double>, kLengths> kReaches = {
-    {{0.18, 0.3}, {0.35, 0.2}, {0.52, 0.15}}};
+// In radii: how far from the rim an edge is looked for, how far its two levels are away, and over how
+// much they are taken. The longer, the more noise gets in; blur at 0.5 m/s over 20 ms is 0.17 each way.
+struct Ratios {
+  double edge, ends, level;
+};
+constexpr std::array<Ratios, kLengths> kReaches = {
+    {{0.18, 0.18, 0.3}, {0.35, 0.35, 0.2}, {0.52, 0.52, 0.15}, {0.18, 0.52, 0.15}}};
 constexpr double kReachMinPx = 1.6;
 // A ray counts when its step is this share of the disc's typical one, and its edge in the profile.
 constexpr double kStepShare = 0.3;
 constexpr double kShiftShare = 0.8;
 constexpr double kResponseMinDn = 6.0;
 constexpr double kGainMin = 0.02;
-// Ground so many deviations off that round most of the disc may be another thing, which blur has
-// brought near. Its noise is that between rays so far apart that they share no pixels.
-constexpr double kUsualSpreads = 2.0;
+constexpr double kBlurredMore = 1.15;
+// Ground within so many deviations of that round most of the disc is the same ground and noise; what is
+// beyond may be another thing. Noise of a ray is that between rays so far apart that they share no pixels.
+constexpr double kUsualSpreads = 3.0;
 constexpr int kStepRays = 3;
 constexpr double kOwnMinDn = 0.3;
 // A disc's level inside may fall by so much with light and shade before it is taken for covered.
@@ -59,7 +63,7 @@ const std::array<Round, 2>& turn() {
 // Level, gain and shift of the profiles of one length.
 struct Length {
   Round rise, level, gain, shift, inner, low, high, strange;
-  double usual_low, usual_high;
+  double usual_low, usual_high, lean;
 };
 
 // Running sums of the profile of each ray, kRays x (samples + 1).
@@ -93,7 +97,7 @@ double ray_noise_dn(const Round& values) {
 // Levels with their first turn round the disc grown by a share `lean`: light that falls to one side does
 // so on from where the levels are taken out to the rim. One that differs by much is a shade or a cover.
 // So does one within the noise of the rays' own levels, `inner`, which would only be added to the rest.
-Round leaning(const Round& inner, double lean) {
+Round leaning(const Round& inner, double lean, double& grown) {
   const Round levels = about(inner, kLevelRays);
   double mean = 0.0;
   double along = 0.0;
@@ -106,43 +110,73 @@ Round leaning(const Round& inner, double lean) {
   const double square = along * along + across * across;
   const double own_dn = ray_noise_dn(inner);
   const double sure = 1.0 - kLeanNoise * own_dn * own_dn / std::max(square, 1e-12);
+  grown = 0.0;
   if (lean == 0.0 || sure <= 0.0 || square > kLeanMax * kLeanMax * mean * mean) {
     return levels;
   }
+  grown = sure * lean;
   Round leant;
   for (int ray = 0; ray < kRays; ++ray) {
-    leant[ray] = levels[ray] + sure * lean * (along * turn()[0][ray] + across * turn()[1][ray]);
+    leant[ray] = levels[ray] + grown * (along * turn()[0][ray] + across * turn()[1][ray]);
   }
   return leant;
 }
 
+// Levels outside, less what their spread round the disc lets them be off that round most of it.
+Round settled(const Round& levels) {
+  const double usual = median(levels);
+  Round away;
+  for (int ray = 0; ray < kRays; ++ray) {
+    away[ray] = std::abs(levels[ray] - usual);
+  }
+  const double free = kUsualSpreads * 1.4826 * median(away);
+  for (int ray = 0; ray < kRays; ++ray) {
+    away[ray] = usual + std::copysign(std::max(away[ray] - free, 0.0), levels[ray] - usual);
+  }
+  return away;
+}
+
 struct Swing {
   Round rise, swing, inner, outer, low, high;
+  double lean;
+};
+
+// Where a profile's mean and its two levels are taken, samples: the mean within `edge` of its middle,
+// the levels from `ends` on.
+struct Reach {
+  int edge, ends, level;
+  double lean;
 };
 
 // How far between its two levels the mean of each profile is: -1 all outside, 1 all inside.
+// With `usual` the level outside is that round most of the disc.
 Swing swing(const std::vector<float>& response, const std::vector<double>& sums, int samples, int middle,
-            int edge, int level, double lean) {
+            const Reach& reach, bool usual) {
+  const auto [edge, ends, level, lean] = reach;
   Round inner, outer, between;
   for (int ray = 0; ray < kRays; ++ray) {
     const double* s = &sums[ray * (samples + 1)];
     const float* r = &response[ray * samples];
     const int first = middle - edge;
     const int last = middle + edge;
-    inner[ray] = (s[first] - s[first - level]) / level;
-    outer[ray] = (s[last + 1 + level] - s[last + 1]) / level;
+    const int in = middle - ends;
+    const int out = middle + ends;
+    inner[ray] = (s[in] - s[in - level]) / level;
+    outer[ray] = (s[out + 1 + level] - s[out + 1]) / level;
     between[ray] = (s[last + 1] - s[first] - 0.5 * (r[first] + r[last])) * (0.5 / edge);
   }
-  const Round low = about(outer, kLevelRays);
-  const Round high = leaning(inner, lean);
+  const Round low = settled(about(outer, kLevelRays));
   Swing found;
+  const Round high = leaning(inner, lean, found.lean);
   found.inner = inner;
   found.outer = outer;
   found.low = low;
   found.high = high;
+  const double usual_dn = usual ? median(low) : 0.0;
   for (int ray = 0; ray < kRays; ++ray) {
-    found.rise[ray] = high[ray] - low[ray];
-    found.swing[ray] = 2.0 * (between[ray] - low[ray]) / std::max(found.rise[ray], 1.0) - 1.0;
+    const double ground = usual ? usual_dn : low[ray];
+    found.rise[ray] = high[ray] - ground;
+    found.swing[ray] = 2.0 * (between[ray] - ground) / std::max(found.rise[ray], 1.0) - 1.0;
   }
   return found;
 }
@@ -158,18 +192,13 @@ void take_better_side(Round& level, Round& gain) {
   }
 }
 
-// How far the ground outside each ray is from that round most of the disc, beyond what its noise lets
-// it be, in units of the noise of one sample; `level` samples of a ray make its own ground, `outer`.
+// How far the ground outside each ray is from that round most of the disc, in units of the noise of one
+// sample; `level` samples of a ray make its own ground, `outer`.
 Round strangeness(const Round& outer, const Round& low, double usual, int level) {
+  const double sample_dn = std::max(ray_noise_dn(outer), kOwnMinDn) * std::sqrt(static_cast<double>(level));
   Round away;
   for (int ray = 0; ray < kRays; ++ray) {
-    away[ray] = std::abs(low[ray] - usual);
-  }
-  const double own_dn = std::max(ray_noise_dn(outer), kOwnMinDn);
-  const double free_dn = kUsualSpreads * own_dn / std::sqrt(static_cast<double>(kLevelRays) / kStepRays);
-  const double sample_dn = own_dn * std::sqrt(static_cast<double>(level));
-  for (double& one : away) {
-    one = std::max(one - free_dn, 0.0) / sample_dn;
+    away[ray] = std::abs(low[ray] - usual) / sample_dn;
   }
   return away;
 }
@@ -177,16 +206,17 @@ Round strangeness(const Round& outer, const Round& low, double usual, int level)
 }  // namespace
 
 double reach_px(double radius_px) {
-  const double reach = std::max(kReaches[kLengths - 1].first * radius_px, kReachMinPx);
+  const double reach = std::max(kReaches[kLengths - 1].ends * radius_px, kReachMinPx);
   return std::min(reach, 0.8 * radius_px);
 }
 
 Profiles::Profiles(double radius_px) : half_(0) {
   for (int k = 0; k < kLengths; ++k) {
-    const auto [reach, level] = kReaches[k];
+    const auto [reach, ends, level] = kReaches[k];
     edge_[k] = static_cast<int>(std::ceil(std::max(reach * radius_px, kReachMinPx)));
+    ends_[k] = static_cast<int>(std::ceil(std::max(ends * radius_px, kReachMinPx)));
     level_[k] = std::max(2, static_cast<int>(std::nearbyint(level * radius_px)));
-    half_ = std::max(half_, edge_[k] + level_[k] + 1);
+    half_ = std::max(half_, ends_[k] + level_[k] + 1);
     // Longer ones are for blurred rims, whose levels fall to one side with the blur and not with light.
     const double levels_at = radius_px - edge_[k] - 0.5 * level_[k];
     lean_[k] = k == 0 && levels_at > 0.5 * radius_px ? (radius_px - 0.5 * edge_[k]) / levels_at - 1.0 : 0.0;
@@ -200,13 +230,16 @@ Edges Profiles::edges(const std::vector<float>& response) const {
   for (int k = 0; k < kLengths; ++k) {
     Length& own = lengths[k];
     const int e = edge_[k];
-    const Swing here = swing(response, sums, n, half_, e, level_[k], lean_[k]);
-    const Swing in = swing(response, sums, n, half_ - 1, e, level_[k], lean_[k]);
-    const Swing out = swing(response, sums, n, half_ + 1, e, level_[k], lean_[k]);
+    const Reach reach = {e, ends_[k], level_[k], lean_[k]};
+    const bool usual = k == kLengths - 1;
+    const Swing here = swing(response, sums, n, half_, reach, usual);
+    const Swing in = swing(response, sums, n, half_ - 1, reach, usual);
+    const Swing out = swing(response, sums, n, half_ + 1, reach, usual);
     own.rise = here.rise;
     own.inner = here.inner;
     own.low = here.low;
     own.high = here.high;
+    own.lean = here.lean;
     own.usual_low = median(own.low);
     own.usual_high = median(own.high);
     own.strange = strangeness(here.outer, own.low, own.usual_low, level_[k]);
@@ -223,6 +256,7 @@ Edges Profiles::edges(const std::vector<float>& response) const {
     take_better_side(own.level, own.gain);
   }
   Edges found;
+  found.lean = 0.0;
   Round step, inner;
   std::array<int, kRays> best;
   for (int ray = 0; ray < kRays; ++ray) {
@@ -233,7 +267,9 @@ Edges Profiles::edges(const std::vector<float>& response) const {
       const double scatter = 2.0 * edge_[k] * std::sqrt(0.5 / edge_[k] + 0.5 / level_[k]);
       const double moved = edge_[k] * lengths[k].strange[ray];
       const double noise = std::hypot(scatter, moved) / lengths[k].level[ray];
-      if (gain / noise > most) {
+      // The last is for blurred rims alone: its levels do not follow light that falls to one side.
+      const double least = k == kLengths - 1 ? kBlurredMore * most : most;
+      if (gain / noise > least) {
         most = gain / noise;
         best[ray] = k;
         found.gain[ray] = gain;
@@ -241,6 +277,7 @@ Edges Profiles::edges(const std::vector<float>& response) const {
       }
     }
     const Length& own = lengths[best[ray]];
+    found.lean += own.lean / kRays;
     step[ray] = own.rise[ray];
     inner[ray] = own.inner[ray];
     found.shift[ray] = own.shift[ray];

@@ -13,7 +13,7 @@
 namespace vision {
 
 constexpr int kRays = 48;
-constexpr int kLengths = 3;
+constexpr int kLengths = 4;
 // Rays over which an edge's two levels are averaged: a sixth of the rim follows a shadow's edge.
 constexpr int kLevelRays = 7;
 
@@ -22,12 +22,13 @@ using Mask = std::array<bool, kRays>;
 
 // Edges along the profiles of one disc: `shift` in samples, outwards; `gain` what a shift of the
 // disc by one sample does to it; `noise` its standard deviation for a noise of 1 DN; `typical_dn`
-// the disc's response. `ground` and `cover` are how far the shift would move if the level outside, or
+// the disc's response, `lean` by how much the first turn of its levels was grown. `ground` and `cover` are how far the shift would move if the level outside, or
 // a level inside that is much too low, were that round most of the disc.
 struct Edges {
   Round shift, gain, noise, ground, cover;
   Mask usable;
   double typical_dn;
+  double lean;
 };
 
 // The sums that turn profiles into edges. A profile has 2 `half` + 1 samples about a px apart;
@@ -36,7 +37,7 @@ class Profiles {
  public:
   explicit Profiles(double radius_px);
 
-  int edge() const { return edge_[kLengths - 1]; }
+  int edge() const { return ends_[kLengths - 1]; }
   int half() const { return half_; }
   int samples() const { return 2 * half_ + 1; }
   // The first of two samples next to the rim: inside, and outside.
@@ -47,7 +48,7 @@ class Profiles {
   Edges edges(const std::vector<float>& response) const;
 
  private:
-  std::array<int, kLengths> edge_, level_;
+  std::array<int, kLengths> edge_, ends_, level_;
   std::array<double, kLengths> lean_;
   int half_;
 };

@@ -55,7 +55,10 @@ class GuardedLaw:
             "theta_dot_rad_s", command.theta_dot_rad_s, self._limits.theta_dot_max_rad_s, "rad/s"
         )
         self._check_trace(command.trace)
-        return command
+        if type(command.eta1_m_s) is float and type(command.theta_dot_rad_s) is float:
+            return command
+        # As 64 bits from here on, whatever the law calculates in: what follows is then the same everywhere.
+        return OuterCommand(float(command.eta1_m_s), float(command.theta_dot_rad_s), command.trace)
 
     def _check_trace(self, trace: object) -> None:
         """Refuse a trace that the record could not hold; NaN stands for "does not exist"."""

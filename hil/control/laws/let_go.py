@@ -48,5 +48,5 @@ class LetGo:
     def _presses(self, command: OuterCommand, estimate: Estimate) -> bool:
         if self._least_rad_s is None or not estimate.driven_hard:
             return False
-        wheels = self._vehicle.wheels(command.eta1_m_s, command.theta_dot_rad_s)
-        return max(map(abs, wheels)) <= self._least_rad_s
+        left, right = self._vehicle.wheels(command.eta1_m_s, command.theta_dot_rad_s)
+        return max(abs(left), abs(right)) <= self._least_rad_s

@@ -5,6 +5,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <vector>
@@ -291,16 +292,28 @@ nb::list others_of(Pump& pump) {
   return out;
 }
 
-// Frames as hil.record.schema.FRAME_NAMES has them, t = 0 at origin_s.
-nb::list frame_rows(const Pump& pump, double origin_s) {
-  nb::list out;
+// Frames as hil.record.schema.FRAME_NAMES has them, t = 0 at origin_s, one double a value.
+nb::bytes frame_rows(const Pump& pump, double origin_s) {
+  constexpr std::size_t kWidth = 21;  // marks and covariances are not known
+  std::vector<double> out(pump.frames.size() * kWidth, runs::kNone);
+  double* row = out.data();
   for (const Pump::FrameRow& f : pump.frames) {
     const double t_s = f.t_arrival_s - origin_s, none = runs::kNone;
-    out.append(nb::make_tuple(t_s, t_s - f.latency_s, f.t_cam_s, f.index, f.seen, f.seen ? f.x_m : none,
-                              f.seen ? f.y_m : none, f.seen ? f.theta_rad : none, f.quality, f.sigma_xy_m,
-                              f.sigma_theta_rad, none, none, none, none, none, none, none, none, none, none));
+    const double known[] = {t_s,
+                            t_s - f.latency_s,
+                            f.t_cam_s,
+                            static_cast<double>(f.index),
+                            f.seen ? 1.0 : 0.0,
+                            f.seen ? f.x_m : none,
+                            f.seen ? f.y_m : none,
+                            f.seen ? f.theta_rad : none,
+                            f.quality,
+                            f.sigma_xy_m,
+                            f.sigma_theta_rad};
+    std::copy(std::begin(known), std::end(known), row);
+    row += kWidth;
   }
-  return out;
+  return nb::bytes(reinterpret_cast<const char*>(out.data()), out.size() * sizeof(double));
 }
 
 core::SimulatedRig& rig_of(const nb::capsule& handle) {
@@ -363,12 +376,16 @@ void bind_pump(nb::module_& m) {
 
 }  // namespace
 
+void bind_drive(nb::module_& m);  // drive_bind.cpp
+
 NB_MODULE(_native, m) {
   nb::set_leak_warnings(false);  // values held by a test session at exit are no leak
-  for (const char* name : {"hil.core._native", "hil.wire._wire", "hil.control.estimators._fused"}) {
+  for (const char* name :
+       {"hil.core._native", "hil.wire._wire", "hil.control.estimators._fused", "hil.control._outer"}) {
     nb::module_::import_(name);  // the types of what is handed in here
   }
   bind_plausibility(m);
   bind_watch(m);
   bind_pump(m);
+  bind_drive(m);
 }

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from hil.study.campaign.workers import in_processes
 from hil.study.work_folder import LOCK, is_new, sigterm_stops, sole_writer
 
 if TYPE_CHECKING:
+    from hil.config.scenario import Scenario
     from hil.study.campaign.merge import Results
 
 Progress = Callable[[int, int], None]
@@ -81,7 +82,7 @@ def run_job(campaign: Campaign, job: Job) -> Row:
 def _run(campaign: Campaign, job: Job) -> Row:
     from hil.runs.execute import RunSpec, execute_in_memory  # noqa: PLC0415 - in the worker only
 
-    scenario = campaign.scenario(job.point)
+    scenario = _scenario(campaign, job.point)
     check_fit(scenario)
     file = campaign.file
     record = execute_in_memory(
@@ -98,6 +99,18 @@ def _run(campaign: Campaign, job: Job) -> Row:
         return row_of(job, manifest.outcome, manifest.outcome_detail, False, end_s, [])
     holds = all(verdict.holds for verdict in record.verdicts())
     return row_of(job, "complete", "", holds, end_s, list(record.figures().values.items()))
+
+
+# The newest point and its scenario: runs of one point follow each other, and none can change it.
+_newest: list[tuple[Campaign, str, Scenario]] = []
+
+
+def _scenario(campaign: Campaign, point: Sequence[tuple[str, Any]]) -> Scenario:
+    """Return the scenario at a point; raises BadInput."""
+    key = repr(point)  # 1 and 1.0 are not the same everywhere
+    if not _newest or _newest[0][0] is not campaign or _newest[0][1] != key:
+        _newest[:] = [(campaign, key, campaign.scenario(point))]
+    return _newest[0][2]
 
 
 def _where(error: Exception) -> str:

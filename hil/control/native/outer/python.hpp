@@ -1,0 +1,205 @@
+// What the C++ written by translate.py stands on: Python's arithmetic, tuples, None, and traces, to the bit.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "asg_ism.hpp"
+#include "exact.hpp"
+
+namespace outer {
+
+using Vec2 = std::tuple<double, double>;
+
+// Where Python's arithmetic raises and C++'s does not. A law that does so ends the run.
+class ArithmeticError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+namespace m {
+
+struct None {};
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double inf = std::numeric_limits<double>::infinity();
+constexpr double pi = 3.14159265358979323846;
+
+inline double quotient(double a, double b) {
+  if (b == 0.0) throw ArithmeticError("ZeroDivisionError: float division by zero");
+  return a / b;
+}
+inline double in_domain(double x, bool is) {
+  if (!is) throw ArithmeticError("ValueError: math domain error");
+  return x;
+}
+inline double power(double x, double y) {
+  const double out = core::power(x, y);
+  if (!std::isfinite(out) && std::isfinite(x) && std::isfinite(y)) {
+    throw ArithmeticError("OverflowError: Numerical result out of range");
+  }
+  return out;
+}
+inline double cos(double x) { return std::cos(in_domain(x, !std::isinf(x))); }
+inline double sin(double x) { return std::sin(in_domain(x, !std::isinf(x))); }
+inline double sqrt(double x) { return std::sqrt(in_domain(x, !(x < 0.0))); }
+inline double hypot(double a, double b) { return core::hypot(a, b); }
+inline double copysign(double a, double b) { return std::copysign(a, b); }
+inline bool isfinite(double a) { return std::isfinite(a); }
+inline double abs(double a) { return std::fabs(a); }
+// The first of two that are equal, or of which one is no number.
+template <typename T>
+T max(T a, T b) {
+  return b > a ? b : a;
+}
+template <typename T>
+T min(T a, T b) {
+  return b < a ? b : a;
+}
+
+template <typename... T>
+std::tuple<T...> tup(T... values) {
+  return std::tuple<T...>(values...);
+}
+
+template <typename T>
+int len(const std::vector<T>& of) {
+  return static_cast<int>(of.size());
+}
+template <typename T>
+T& element(std::vector<T>& of, int i) {
+  return of.at(static_cast<std::size_t>(i));
+}
+template <typename T>
+const T& element(const std::vector<T>& of, int i) {
+  return of.at(static_cast<std::size_t>(i));
+}
+inline int bisect_right(const std::vector<double>& of, double x) {
+  return static_cast<int>(std::upper_bound(of.begin(), of.end(), x) - of.begin());
+}
+
+template <std::size_t I>
+struct Place {};
+template <std::size_t I, typename... T>
+const auto& item(const std::tuple<T...>& of) {
+  return std::get<I>(of);
+}
+template <std::size_t I, typename T>
+const T& item(const std::vector<T>& of) {
+  return of.at(I);
+}
+template <std::size_t I, typename Struct>
+auto item(const Struct& of) -> decltype(item_of(of, Place<I>{})) {
+  return item_of(of, Place<I>{});
+}
+
+inline std::array<double, 2> both(double x) { return {x, x}; }
+
+}  // namespace m
+
+// A value or None; where it is used as a value it must be one.
+template <typename T>
+class Opt {
+ public:
+  Opt() = default;
+  Opt(m::None) {}
+  explicit Opt(const T& value) : is_(true), value_(value) {}
+  Opt& operator=(const T& value) {
+    is_ = true;
+    value_ = value;
+    return *this;
+  }
+  operator const T&() const {
+    if (!is_) throw ArithmeticError("TypeError: None where a number is needed");
+    return value_;
+  }
+  bool is_none() const { return !is_; }
+
+ private:
+  bool is_ = false;
+  T value_{};
+};
+
+namespace m {
+template <typename T>
+bool is_none(const Opt<T>& value) {
+  return value.is_none();
+}
+}  // namespace m
+
+constexpr std::size_t kTraceSize = 14;   // names of a law's trace, in all translated laws
+constexpr std::size_t kTraceSlots = 32;  // with those of a law of somebody's own behind them
+
+// A law's trace: for each of kTraceKeys, and of the names of its own, a number or nothing.
+class Trace {
+ public:
+  Trace&& with(std::size_t key, double value) && {
+    values_[key] = value;
+    has_ |= 1U << key;
+    return std::move(*this);
+  }
+  // The value by that key, NaN for none.
+  double get(std::size_t key) const { return (has_ >> key & 1U) != 0 ? values_[key] : m::nan; }
+  friend Trace operator|(Trace a, const Trace& b) {  // of both, that of b
+    for (std::size_t key = 0; key < kTraceSlots; ++key) {
+      if ((b.has_ >> key & 1U) != 0) a.values_[key] = b.values_[key];
+    }
+    a.has_ |= b.has_;
+    return a;
+  }
+
+ private:
+  std::array<double, kTraceSlots> values_{};
+  std::uint32_t has_ = 0;
+};
+
+// hil.control.AsgIsm of two dimensions, as the outer law calls it.
+class AsgBlock {
+ public:
+  struct Gains {
+    std::array<double, 2> k{}, eps_min{};
+    double eps0 = 0.0, beta = 0.5, mu0_s = 1.0, sigma = 1.0;
+    bool radial = false;
+  };
+  explicit AsgBlock(const Gains& gains) : law_(native(gains)) {}
+
+  void reset(const Vec2& p, const Vec2& q) { law_.reset(vec(p), vec(q)); }
+  std::tuple<Vec2, Vec2, Vec2, Vec2, Vec2> terms(double t_s, const Vec2& p, const Vec2& q) {
+    const control::AsgTerms& now = law_.observe(t_s, vec(p), vec(q));
+    return {pair(now.s), pair(now.kappa), pair(now.psi), pair(now.dh), pair(now.eps)};
+  }
+  void advance(double dt_s) { law_.advance(dt_s); }
+
+ private:
+  static control::Vec vec(const Vec2& v) {
+    control::Vec out{};
+    std::tie(out[0], out[1]) = v;
+    return out;
+  }
+  static Vec2 pair(const control::Vec& v) { return {v[0], v[1]}; }
+  static control::AsgGains native(const Gains& gains) {
+    control::AsgGains out;
+    out.n = 2;
+    for (int i = 0; i < 2; ++i) out.k[i] = gains.k[i], out.eps_min[i] = gains.eps_min[i];
+    out.eps0 = gains.eps0;
+    out.beta = gains.beta;
+    out.mu0 = gains.mu0_s;
+    out.sigma = gains.sigma;
+    out.radial = gains.radial;
+    return out;
+  }
+
+  control::AsgIsm law_;
+};
+
+}  // namespace outer

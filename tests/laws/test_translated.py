@@ -1,0 +1,274 @@
+"""Laws and references in native code are their Python sources, to the bit."""
+
+import math
+import struct
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hil.config.control import (
+    CircleReference,
+    ControlConfig,
+    OuterLimits,
+    PointReference,
+    StopsReference,
+    WaypointReference,
+)
+from hil.config.load import load_scenario
+from hil.control import _outer, translated
+from hil.control.laws import chain
+from hil.control.laws.asg_ism import AsgIsm
+from hil.control.laws.hold import HoldAtGoal
+from hil.control.laws.let_go import LetGo
+from hil.control.laws.parts import WithoutKappa, replace_block
+from hil.control.laws.state_feedback import StateFeedback
+from hil.control.laws.turn_first import TurnFirst
+from hil.control.laws.within import WithinWheelSpeed
+from hil.control.references import Reference, make_reference
+from hil.control.vehicles.vehicle import make_vehicle
+from hil.core.types import OuterCommand, ReferenceState
+from tests.laws.support import D0_M, estimate, point
+
+VEHICLE = make_vehicle(load_scenario("scenario-1").robot)
+SPEEDS = st.floats(-1.0, 1.0)
+PLACES = st.floats(-2.0, 2.0)
+VECTORS = st.tuples(SPEEDS, SPEEDS)
+STEPS = st.lists(
+    st.fixed_dictionaries(
+        {
+            "x": PLACES,
+            "y": PLACES,
+            "theta": st.floats(-7, 7),
+            "eta1": SPEEDS,
+            "w": st.floats(-3, 3),
+            "z3": st.none() | VECTORS,
+            "sides": st.sampled_from([(0, 0), (1, 0), (0, -1), (1, -1)]),
+            "hard": st.booleans(),
+            "near": st.booleans(),  # at the goal and slow: where laws hold
+            "moving": st.booleans(),
+            "rates": st.tuples(VECTORS, VECTORS, VECTORS),
+        }
+    ),
+    min_size=1,
+    max_size=12,
+)
+LIMITS = st.builds(
+    OuterLimits,
+    approach_speed_m_s=st.none() | st.floats(0.05, 1.0),
+    approach_accel_m_s2=st.none() | st.floats(0.1, 3.0),
+    turn_missing_rad_s=st.none() | st.floats(0.1, 3.0),
+    let_go_rad_s=st.none() | st.floats(0.1, 9.0),
+    lead_s=st.floats(0.0, 0.2),
+    lambda_m_s=st.floats(0.001, 0.5),
+)
+LAWS = st.sampled_from(["pid", "asg-ism"])
+
+
+def gains_of(law, p, cost, start):
+    """Return gains of a law with the parts that ship switched off switched on."""
+    shipped = ControlConfig().active_gains
+    if law == "pid":
+        return shipped.pid.model_copy(update={"ki_s4": 1.5, "zeta_start_m_s2": start})
+    more = {"p": p, "cost": cost, "eps0_m_s2": 0.4, "gamma1_s3": 0.3, "zeta_start_m_s2": start}
+    return shipped.asg_ism.model_copy(update=more)
+
+
+def stacked(law, gains, limits, within_rad_s=9.0):
+    """Return a law under all that holds for every law."""
+    inner = (StateFeedback if law == "pid" else AsgIsm)(gains, limits, D0_M)
+    bounded = WithinWheelSpeed(HoldAtGoal(inner, limits), VEHICLE, within_rad_s)
+    turning = TurnFirst(bounded, limits.turn_missing_rad_s)
+    return LetGo(turning, VEHICLE, limits.let_go_rad_s)
+
+
+def situation(drawn):
+    """Return reference and estimate of a drawn step."""
+    rates = drawn["rates"] if drawn["moving"] else ((0.0, 0.0),) * 3
+    goal = (drawn["x"] + 0.001, drawn["y"]) if drawn["near"] else (0.3, -0.2)
+    eta1, w = (0.01, 0.1) if drawn["near"] else (drawn["eta1"], drawn["w"])
+    here = estimate(drawn["x"], drawn["y"], drawn["theta"], eta1, w=w, z3=drawn["z3"])
+    return ReferenceState(goal, *rates), replace(
+        here, sides_at_limit=drawn["sides"], driven_hard=drawn["hard"]
+    )
+
+
+def bits(values):
+    """Return numbers as they lie in memory."""
+    return [struct.pack("d", value) for value in values]
+
+
+def unequal(law, twin, steps):
+    """Return the numbers of the steps at which two laws differ."""
+    found = []
+    for number, drawn in enumerate(steps):
+        reference, here = situation(drawn)
+        if number == 0:
+            law.reset(reference, here)
+            twin.reset(reference, here)
+        out, (eta1, w, trace) = (
+            law.step(reference, here, 1 / 30),
+            twin.step(reference, here, 1 / 30),
+        )
+        mine = bits([out.eta1_m_s, out.theta_dot_rad_s])
+        mine += bits(out.trace.get(key, math.nan) for key in _outer.TRACE_KEYS)
+        if mine != bits([eta1, w, *(trace[key] for key in _outer.TRACE_KEYS)]):
+            found.append(number)
+    return found
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    law=LAWS,
+    limits=LIMITS,
+    steps=STEPS,
+    p=st.sampled_from([1.0, 1.5, 2.0]),
+    cost=st.sampled_from(["sum", "norm"]),
+    start=st.none() | st.floats(0.0, 1.0),
+    within_rad_s=st.floats(1.0, 12.0),
+)
+def test_a_native_law_is_its_python_source(law, limits, steps, *, p, cost, start, within_rad_s):
+    """Commands and traces are equal to the bit, whatever limits, gains and steps are drawn."""
+    made = stacked(law, gains_of(law, p, cost, start), limits, within_rad_s)
+    twin = translated.native_law(made)
+    assert translated.is_translated(made._law._law._law._law)
+    assert unequal(made, twin, steps) == []
+
+
+def test_the_comparison_sees_one_unit_in_the_last_place():
+    """A gain that differs by its last bit gives other commands (negative control)."""
+    gains, limits = gains_of("pid", 1.0, "sum", None), OuterLimits()
+    other = gains.model_copy(update={"kp_s3": math.nextafter(gains.kp_s3, math.inf)})
+    twin = translated.native_law(stacked("pid", other, limits))
+    step = {
+        "x": 0.0, "y": 0.1, "theta": 0.4, "eta1": 0.2, "w": 0.1, "z3": None, "sides": (0, 0),
+        "hard": False, "near": False, "moving": False, "rates": ((0.0, 0.0),) * 3,
+    }  # fmt: skip
+    steps = [step | {"x": 0.05 * k} for k in range(8)]
+    assert unequal(stacked("pid", gains, limits), twin, steps) != []
+
+
+REFERENCES = {
+    "point": PointReference(x_m=0.3, y_m=-0.2),
+    "circle": CircleReference(radius_m=0.7, rate_rad_s=0.41, center_x_m=0.1),
+    "line": WaypointReference(points_m=((0.0, 0.0), (0.7, 0.3))),
+    "waypoints": WaypointReference(points_m=((0.0, 0.0), (0.5, 0.2), (0.6, 0.7), (0.0, 0.9))),
+    "stops": StopsReference(points_m=((0.0, 0.0), (0.5, 0.2), (0.1, 0.6)), pause_s=0.7),
+}
+
+
+@settings(max_examples=60, deadline=None)
+@given(kind=st.sampled_from(sorted(REFERENCES)), times=st.lists(st.floats(-1.0, 40.0), max_size=20))
+def test_a_native_reference_is_its_python_source(kind, times):
+    """Place and derivatives are equal to the bit at every time, before the start and after the end too."""
+    reference: Reference = make_reference(REFERENCES[kind])
+    twin = translated.native_reference(reference)
+    for t_s in (0.0, *times):
+        state = reference.at(t_s)
+        of = (state.z1_m, state.z1_dot_m_s, state.z1_ddot_m_s2, state.z1_dddot_m_s3)
+        assert [bits(v) for v in twin.at(t_s)] == [bits(v) for v in of]
+
+
+class Derived(AsgIsm):
+    """A law of somebody's own that changes a part of a built-in one."""
+
+    def _bound(self, reference, estimate):
+        return 2.0 * super()._bound(reference, estimate)
+
+
+def shipped(kind=AsgIsm):
+    """Return a law of this class with its shipped gains."""
+    return kind(ControlConfig().active_gains.asg_ism, OuterLimits(), D0_M)
+
+
+def test_what_is_not_the_class_itself_is_not_taken_for_it():
+    """Derived classes, blocks with a part off, replaced methods of one object: all are asked in Python."""
+    assert translated.is_translated(shipped())
+    assert not translated.is_translated(shipped(Derived))
+    ablated = shipped()
+    replace_block(ablated, WithoutKappa)
+    assert not translated.is_translated(ablated)
+    patched = shipped()
+    patched.step = lambda *_: None
+    assert not translated.is_translated(patched)
+
+
+@settings(max_examples=30, deadline=None)
+@given(steps=STEPS, limits=LIMITS)
+def test_native_code_asks_a_law_in_python_the_same(steps, limits):
+    """Under what holds for every law, a derived law gives the same commands and traces to the bit."""
+    gains = gains_of("asg-ism", 1.0, "norm", None)
+
+    def made():
+        bounded = WithinWheelSpeed(HoldAtGoal(Derived(gains, limits, D0_M), limits), VEHICLE, 6.0)
+        return LetGo(TurnFirst(bounded, limits.turn_missing_rad_s), VEHICLE, limits.let_go_rad_s)
+
+    assert unequal(made(), translated.native_law(made()), steps) == []
+
+
+class Traced:
+    """A law whose trace is its own; `trace` is what it gives."""
+
+    def __init__(self, trace):
+        self.trace = trace
+        self.asked = []
+
+    def reset(self, reference, estimate):
+        self.asked.append((reference, estimate))
+
+    def step(self, reference, estimate, dt_s):
+        assert dt_s > 0.0
+        self.asked.append((reference, estimate))
+        return OuterCommand(0.1, 0.2, self.trace)
+
+
+def test_a_law_in_python_is_given_values_as_python_makes_them():
+    """Reference and estimate are equal to those that a session makes, and of the same classes."""
+    law = Traced({})
+    native = translated.native_law(law)
+    reference, here = (
+        ReferenceState((1.0, 2.0), (0.1, 0.2), (0.3, 0.4), (0.5, 0.6)),
+        estimate(0.1, w=0.3),
+    )
+    here = replace(here, sides_at_limit=(1, -1), driven_hard=True)
+    native.reset(reference, here)
+    assert law.asked == [(reference, here)]
+    assert [type(value) for value in law.asked[0]] == [type(reference), type(here)]
+
+
+def test_an_error_of_a_law_in_python_comes_through_native_code():
+    """What a law raises, or gives that is no number, is raised as it is."""
+    law = Traced({"eps": "much"})
+    native = translated.native_law(law)
+    with pytest.raises(TypeError, match="must be real number"):
+        native.step(point(0, 0), estimate(), 0.1)
+    law.step = None
+    law.reset = lambda *_: 1 / 0
+    with pytest.raises(ZeroDivisionError):
+        translated.native_law(law).reset(point(0, 0), estimate())
+
+
+def test_a_law_with_more_names_than_there_is_room_for_stays_in_python():
+    """Its own names take a place each."""
+    names = tuple(f"term_{k}" for k in range(_outer.OWN_TERMS_MOST + 1))
+    assert translated.native_law(Traced({}), names) is None
+    assert translated.native_law(Traced({}), names[1:]) is not None
+
+
+@pytest.mark.parametrize("name", ["damped_inverse", "clip", "Chain"])
+def test_a_replaced_part_switches_native_laws_off(name, monkeypatch):
+    """Whoever replaces a function of a law has it called: native code would not."""
+    monkeypatch.setattr(chain, name, lambda *_, **__: (0.0, 0.0))
+    assert translated.native_law(shipped()) is None
+
+
+def test_a_source_that_has_changed_since_is_run_in_python(monkeypatch):
+    """Native code of an older source is not used."""
+    (path, _), *others = _outer.SOURCES
+    monkeypatch.setattr(_outer, "SOURCES", ((path, "0" * 64), *others))
+    translated._as_translated.cache_clear()
+    try:
+        assert translated.native_law(shipped()) is None
+    finally:
+        translated._as_translated.cache_clear()
