@@ -380,7 +380,7 @@ def set_limit(value: float):
 
 
 def test_stamp_zero_is_nobodys():
-    """A board that has met no clock takes stamp 1 of a new sender, once; never stamp 0, which says "nobody"."""
+    """A board that met no clock takes stamp 1 of a new sender, once; never 0, which stands for "nobody"."""
     bench = SignedBench(_firmware.stored_key(KEY, 0), Peer(stamp=1))
     for stamp, acted_on in ((0, False), (1, True)):
         frame = Peer(link_id=5, stamp=stamp).encode(set_limit(0.5))

@@ -19,8 +19,8 @@ import pytest
 
 from hil.core.errors import BadInput
 from hil.core.types import OuterCommand
-from hil.record.layout import FRAMES_JOURNAL, SAMPLES_JOURNAL
 from hil.record import manifest as manifest_room
+from hil.record.layout import FRAMES_JOURNAL, SAMPLES_JOURNAL
 from hil.record.manifest import WRITER_GONE, read_manifest
 from hil.record.reader import picture_name, read_pictures, read_run
 from hil.record.recorder import Recorder
