@@ -103,13 +103,13 @@ def _serve(asked: int, told: int) -> NoReturn:
             signal.signal(getattr(signal, name), signal.SIG_IGN)
         from hil.record.rrd import write_rrd  # noqa: PLC0415 - what this process is for
 
-        name = b""
+        heard = b""
         while piece := os.read(asked, _NAME_BYTES):
-            name += piece
-            if name.endswith(_END):
-                folder = Path(os.fsdecode(name.removesuffix(_END)))
+            heard += piece
+            if heard.endswith(_END):
+                folder = Path(os.fsdecode(heard.removesuffix(_END)))
                 os.write(told, _written(write_rrd, folder)[:_ANSWER_BYTES])
-                name = b""
+                heard = b""
     except BaseException:
         pass
     os._exit(0)
