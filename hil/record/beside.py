@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from hil.record.reader import RunRecord
 
 _DONE = b"done"
+_END = b"\0"  # of a folder's name, which may have any other byte
+_NAME_BYTES = 65_536
 _ANSWER_BYTES = 4096
 
 
@@ -82,7 +84,7 @@ class ViewerFile:
     def _asked(self, folder: Path) -> bytes:
         """Return the other process's answer, b"" where it has gone away."""
         with suppress(BrokenPipeError):
-            os.write(self._ask, os.fsencode(folder.absolute()) + b"\n")
+            os.write(self._ask, os.fsencode(folder.absolute()) + _END)
             return os.read(self._answer, _ANSWER_BYTES)
         return b""
 
@@ -101,10 +103,13 @@ def _serve(asked: int, told: int) -> NoReturn:
             signal.signal(getattr(signal, name), signal.SIG_IGN)
         from hil.record.rrd import write_rrd  # noqa: PLC0415 - what this process is for
 
-        with os.fdopen(asked, "rb") as lines:
-            for line in lines:
-                folder = Path(os.fsdecode(line.removesuffix(b"\n")))
+        heard = b""
+        while piece := os.read(asked, _NAME_BYTES):
+            heard += piece
+            if heard.endswith(_END):
+                folder = Path(os.fsdecode(heard.removesuffix(_END)))
                 os.write(told, _written(write_rrd, folder)[:_ANSWER_BYTES])
+                heard = b""
     except BaseException:
         pass
     os._exit(0)

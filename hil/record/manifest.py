@@ -26,7 +26,7 @@ from pydantic import (
 
 from hil.core.errors import BadInput
 from hil.core.figures import Better, Metric
-from hil.core.files import RECORD_BYTES, is_left, read_bounded, replace_file
+from hil.core.files import RECORD_BYTES, alone_in, is_left, read_bounded, replace_file
 from hil.core.registry import Entry
 from hil.record import layout
 from hil.record.schema import SAMPLE_COLUMNS, SCHEMA_VERSION, Column
@@ -248,22 +248,25 @@ def read_manifest(folder: Path) -> Manifest:
         first = error.errors(include_url=False)[0]
         key = ".".join(str(part) for part in first["loc"])
         raise BadInput(f"{path}: damaged: {key}: {first['msg'].lower()}") from None
-    left = manifest.outcome == "running" and is_left(folder / layout.RESERVE)
-    return _end_left(folder, manifest) if left else manifest
+    return _ended(folder, manifest) if manifest.outcome == "running" else manifest
 
 
-def _end_left(folder: Path, manifest: Manifest) -> Manifest:
-    """Say in a record that the process which wrote it has gone, unless it has said itself how it ended.
+def _ended(folder: Path, manifest: Manifest) -> Manifest:
+    """Say in a record that the process which wrote it has gone, unless it is at work, or has said its end.
 
-    A folder that cannot be written to stays as it is.
+    Of several who find it out at once one writes it, and all read the same. A folder that cannot be written
+    to stays as it is.
     """
-    with suppress(OSError, ValueError):
-        if json.loads(read_bounded(folder / layout.MANIFEST, RECORD_BYTES))["outcome"] != "running":
-            return read_manifest(folder)
+    reserve = folder / layout.RESERVE
+    if not is_left(reserve) and reserve.exists():  # it is held: in this order
+        return manifest
     ended = manifest.model_copy(update={"outcome": "fault", "outcome_detail": WRITER_GONE})
-    with suppress(OSError):
+    with suppress(OSError, ValueError), alone_in(folder):
+        now = Manifest.model_validate_json(read_bounded(folder / layout.MANIFEST, RECORD_BYTES))
+        if now.outcome != "running" or not is_left(reserve):
+            return now
         write_manifest(folder, ended, durable=True)
-        (folder / layout.RESERVE).unlink(missing_ok=True)
+        reserve.unlink(missing_ok=True)
     return ended
 
 

@@ -36,6 +36,8 @@ def read_key(path: Path) -> Key:
         secret = bytes.fromhex(text.decode("ascii"))
     except ValueError:
         secret = b""
+    if len(text) == _MOST_BYTES:  # something follows that was not looked at
+        secret = b""
     if len(secret) != KEY_BYTES or not any(secret):
         raise BadInput(
             f"key file {path}: needs {2 * KEY_BYTES} hexadecimal digits, not all zero; make one with "
@@ -49,7 +51,10 @@ def new_key(path: Path, passphrase: str = "") -> None:
 
     Raises BadInput where there is a file already, or none can be made.
     """
-    drawn = hashlib.sha256(passphrase.encode()).digest() if passphrase else secrets.token_bytes(32)
+    try:
+        drawn = hashlib.sha256(passphrase.encode()).digest() if passphrase else None
+    except UnicodeEncodeError:  # bytes of a terminal that are no text
+        raise BadInput("passphrase: is no UTF-8 text; type it again") from None
     try:
         handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, _OWNER_ONLY)
     except FileExistsError:
@@ -57,7 +62,7 @@ def new_key(path: Path, passphrase: str = "") -> None:
     except OSError as error:
         raise BadInput(f"key file {path}: cannot be made: {error.strerror}") from None
     with os.fdopen(handle, "w", encoding="ascii") as file:
-        file.write(drawn.hex() + "\n")
+        file.write((drawn or secrets.token_bytes(KEY_BYTES)).hex() + "\n")
 
 
 def key_of_environment() -> Key | None:

@@ -21,6 +21,8 @@ BLOCK_BYTES = 13
 EPOCH_UNIX_S = 1_420_070_400
 _NS_PER_STAMP = 10_000
 _MINUTE = 6_000_000
+# No clock says more: 48 bits end in 2104. The firmware's STAMP_MOST.
+STAMP_MOST = 2**48 - 1 - 365 * 24 * 60 * _MINUTE
 _MARKER, _FLAGS, _SIGNED = 0xFD, 2, 1
 _HEADER_BYTES, _OVERHEAD_BYTES, _STAMP_BYTES, _SIGNATURE_BYTES = 10, 12, 6, 6
 
@@ -48,8 +50,9 @@ class Cut(NamedTuple):
 
 
 def stamp_at(unix_ns: int) -> int:
-    """Return the time stamp of a moment of the Unix clock."""
-    return (unix_ns - EPOCH_UNIX_S * 1_000_000_000) // _NS_PER_STAMP
+    """Return the time stamp of a moment of the Unix clock; of one before 2015 (a clock never set) 0."""
+    stamp = (unix_ns - EPOCH_UNIX_S * 1_000_000_000) // _NS_PER_STAMP
+    return min(max(stamp, 0), STAMP_MOST)
 
 
 def flagged(frame: bytes, flags: int) -> bytes:
@@ -150,7 +153,7 @@ class FrameChecker:
         stamp = int.from_bytes(block[1 : 1 + _STAMP_BYTES], "little")
         sender = (cut.frame[5], cut.frame[6], block[0])
         # A new sender may be one minute behind.
-        if stamp <= self._last.get(sender, self._signer.stamp - _MINUTE - 1):
+        if not self._last.get(sender, self._signer.stamp - _MINUTE - 1) < stamp <= STAMP_MOST:
             counts.old += 1
             return False
         self._last[sender] = stamp

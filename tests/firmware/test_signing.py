@@ -374,6 +374,85 @@ def test_a_fifth_sender_waits_until_one_of_four_is_a_minute_old():
     assert answered(4)
 
 
+def set_limit(value: float):
+    """Return the order that gives PWM_MAX this value."""
+    return dialect.MAVLink_param_set_message(1, 1, b"PWM_MAX", value, 9)
+
+
+def test_stamp_zero_is_nobodys():
+    """A board that met no clock takes stamp 1 of a new sender, once; never 0, which stands for "nobody"."""
+    bench = SignedBench(_firmware.stored_key(KEY, 0), Peer(stamp=1))
+    for stamp, acted_on in ((0, False), (1, True)):
+        frame = Peer(link_id=5, stamp=stamp).encode(set_limit(0.5))
+        bench.receive(frame)
+        assert (bench.board.parameters["PWM_MAX"] == 0.5) == acted_on
+        bench.set_param("PWM_MAX", 0.75)
+        bench.receive(frame)
+        assert bench.board.parameters["PWM_MAX"] == 0.75
+
+
+# A year before 48 bits are at their end.
+STAMP_MOST = 2**48 - 1 - 365 * 24 * 60 * MINUTE
+
+
+@pytest.mark.parametrize("stamp", [STAMP_MOST + 1, 2**48 - 1])
+def test_a_sender_past_all_clocks_cannot_shut_the_others_out(stamp):
+    """Its frames are refused and move no stamp, now and after a restart."""
+    bench = SignedBench()
+    bench.receive(Peer(link_id=7, stamp=stamp).encode(set_limit(0.5)))
+    bench.tick(STORING_TICKS)
+    assert bench.board.stamp < STAMP + 3 * MINUTE
+    assert bench.board.parameters["PWM_MAX"] == 1.0
+    assert "frame refused: its time stamp is not newer" in bench.texts()
+    for board in (bench, SignedBench(bench.board.eeprom)):
+        board.set_param("PWM_MAX", 0.25)
+        assert board.board.parameters["PWM_MAX"] == 0.25
+
+
+def test_the_last_stamp_of_all_clocks_is_a_stamp_as_any_other():
+    """Up to there a sender is heard, once its stamp is stored."""
+    bench = SignedBench(peer=Peer(stamp=STAMP_MOST - MINUTE))
+    bench.set_param("PWM_MAX", 0.5)
+    bench.tick(40)
+    bench.set_param("PWM_MAX", 0.5)
+    assert bench.board.parameters["PWM_MAX"] == 0.5
+
+
+@pytest.mark.parametrize("begin", [STAMP_MOST + 1, 2**48 - 1, 2**48, 2**64 - 1])
+def test_a_key_that_begins_past_all_clocks_wears_nothing_out(begin):
+    """SETUP_SIGNING has 64 bits for it: the key is set, stamps go on, one is stored per half minute."""
+    bench = SignedBench(b"", Peer(stamp=1))
+    bench.set_key(KEY, usb=True, stamp=begin)
+    assert bench.board.signs
+    before = bench.board.eeprom
+    bench.tick(250 * 20)
+    assert bench.board.eeprom == before
+    assert bench.board.stamp < STAMP_MOST
+    assert bench.arm() == ACCEPTED
+
+
+def test_a_key_cut_short_after_one_was_erased_locks_the_board_too():
+    """That no key was there before is known of a record of its own: half a new one is no leave to all."""
+    bench = SignedBench()
+    bench.set_key(bytes(32), usb=True)
+    assert not bench.board.signs
+    message = dialect.MAVLink_setup_signing_message(1, 1, list(OTHER_KEY), STAMP)
+    bench.board.wired = True
+    bench.board.receive(message.pack(dialect.MAVLink(None, 255, 190)), bench.t_us & UINT32)
+    bench.tick(20)
+    woken = BoardBench()
+    woken.board = _firmware.Board(bench.board.eeprom)
+    woken.set_param("PWM_MAX", 0.5)
+    assert woken.board.parameters["PWM_MAX"] == 1.0
+    assert "stored key damaged: all refused; set it over USB" in woken.texts()
+    locked = SignedBench(bench.board.eeprom)
+    locked.set_key(bytes(32), usb=True)
+    opened = BoardBench()
+    opened.board = _firmware.Board(locked.board.eeprom)
+    opened.set_param("PWM_MAX", 0.5)
+    assert opened.board.parameters["PWM_MAX"] == 0.5
+
+
 def test_without_a_key_a_signed_frame_is_refused_in_words():
     """A host with a key meets a board without: it is told, and nothing is acted on."""
     bench = BoardBench()

@@ -61,6 +61,17 @@ def test_a_process_that_has_gone_away_is_not_missed(run: RunRecord) -> None:
     assert printed(run.path / "run.rrd")
 
 
+def test_a_line_feed_in_a_folders_name_is_a_byte_as_any_other(
+    run: RunRecord, tmp_path: Path
+) -> None:
+    """The record whose name is its beginning is left alone."""
+    make_run(tmp_path / "run\nx", "pid", rerun=False)
+    with ViewerFile() as viewer:
+        viewer.write(read_run(tmp_path / "run\nx"))
+    assert printed(tmp_path / "run\nx" / "run.rrd")
+    assert not (run.path / "run.rrd").exists()
+
+
 def test_signals_of_the_terminal_are_not_for_it(run: RunRecord) -> None:
     """Ctrl-C reaches every process of a terminal; the record is finished all the same."""
     with ViewerFile() as viewer:

@@ -19,6 +19,7 @@ import pytest
 
 from hil.core.errors import BadInput
 from hil.core.types import OuterCommand
+from hil.record import manifest as manifest_room
 from hil.record.layout import FRAMES_JOURNAL, SAMPLES_JOURNAL
 from hil.record.manifest import WRITER_GONE, read_manifest
 from hil.record.reader import picture_name, read_pictures, read_run
@@ -157,6 +158,50 @@ def test_killed_process_leaves_its_rows(tmp_path):
     assert (run.manifest.outcome, run.manifest.outcome_detail) == ("fault", WRITER_GONE)
     assert read_manifest(tmp_path / "run") == run.manifest
     assert "cut off" in run.problems[0]
+
+
+LEFT = """
+import os, pathlib, sys
+from hil.record.recorder import Recorder
+from tests.record.synthetic import manifest
+Recorder(pathlib.Path(sys.argv[1]), manifest())
+os._exit(0)
+"""
+READER = """
+import pathlib, sys
+from hil.record.manifest import read_manifest
+print(read_manifest(pathlib.Path(sys.argv[1])).outcome_detail)
+"""
+
+
+def test_two_who_find_at_once_that_the_writer_has_gone_read_the_same(tmp_path, monkeypatch):
+    """The first says its end while the second looks: at each step of its looking."""
+    root = Path(__file__).resolve().parents[2]
+    folders = [tmp_path / name for name in ("exists", "is_left", "alone")]
+    for folder in folders:
+        subprocess.run([sys.executable, "-c", LEFT, str(folder)], cwd=root, check=True)
+    said: list[str] = []
+
+    def behind(name, folder):
+        """Let another process read the record just before this step of the reader."""
+        step = getattr(manifest_room, name)
+
+        def late(*args):
+            monkeypatch.undo()
+            done = subprocess.run(
+                [sys.executable, "-c", READER, str(folder)],
+                cwd=root, capture_output=True, text=True, check=True,
+            )  # fmt: skip
+            said.append(done.stdout.strip())
+            return step(*args)
+
+        monkeypatch.setattr(manifest_room, name, late)
+
+    for folder, name in zip(folders, ("_ended", "is_left", "alone_in"), strict=True):
+        behind(name, folder)
+        assert read_manifest(folder).outcome_detail == WRITER_GONE
+        assert not list(folder.glob("*.part"))
+    assert said == [WRITER_GONE] * 3
 
 
 FORKED = """

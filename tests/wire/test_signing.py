@@ -23,7 +23,15 @@ from hil.runs.execute import RunSpec, execute
 from hil.wire import dialect, handshake
 from hil.wire.framing import FrameWriter
 from hil.wire.link import BoardLink
-from hil.wire.signing import EPOCH_UNIX_S, FrameChecker, FrameCutter, FrameSigner, Key, stamp_at
+from hil.wire.signing import (
+    EPOCH_UNIX_S,
+    STAMP_MOST,
+    FrameChecker,
+    FrameCutter,
+    FrameSigner,
+    Key,
+    stamp_at,
+)
 
 KEY = Key(bytes(range(1, 33)), "key.txt")
 OTHER = Key(bytes(range(101, 133)), "other.txt")
@@ -121,6 +129,27 @@ def test_stamps_count_ten_microseconds_since_2015():
     assert stamp_at((EPOCH_UNIX_S + 1) * 1_000_000_000) == 100_000
 
 
+@pytest.mark.parametrize("unix_s", [0, EPOCH_UNIX_S - 1, 2**33, 2**40])
+def test_a_clock_that_was_never_set_or_is_past_all_others_signs(unix_s):
+    """1970 and long after 2104: frames go out, each newer than the one before."""
+    now = stamp_at(unix_s * 1_000_000_000)
+    signer = FrameSigner(KEY)
+    signer.stamp = now
+    sent = b"".join(signer.sign(FrameWriter().encode(TEXT), now) for _ in range(3))
+    stamps = [int.from_bytes(cut.block[1:7], "little") for cut in FrameCutter().feed(sent)]
+    assert stamps == [now + 1, now + 2, now + 3]
+
+
+@pytest.mark.parametrize("stamp", [STAMP_MOST + 1, 2**48 - 1])
+def test_a_stamp_past_all_clocks_is_refused(stamp):
+    """Nothing could be newer than it, and 48 bits would end: it moves no stamp."""
+    check = checker()
+    assert check.feed(bytes(TEXT.pack(peer(KEY, stamp)))) == b""
+    assert check.counts.old == 1
+    assert check.feed(bytes(TEXT.pack(peer(KEY, STAMP))))
+    assert check.feed(bytes(TEXT.pack(peer(KEY, STAMP_MOST))))
+
+
 # ---- the key and its file ----
 
 
@@ -147,7 +176,16 @@ def test_a_passphrase_gives_the_key_that_mavproxy_makes_of_it(tmp_path):
     assert "robot" not in result.output
 
 
-@pytest.mark.parametrize("text", ["", "00" * 32, "zz" * 32, "11" * 31, "11" * 33])
+def test_a_passphrase_that_is_no_text_is_refused_in_a_line(tmp_path):
+    """Bytes of a terminal in another encoding: no traceback, no file."""
+    with pytest.raises(BadInput, match="passphrase: is no UTF-8 text"):
+        new_key(tmp_path / "k", b"\xff\xfe".decode(errors="surrogateescape"))
+    assert not (tmp_path / "k").exists()
+
+
+@pytest.mark.parametrize(
+    "text", ["", "00" * 32, "zz" * 32, "11" * 31, "11" * 33, "11" * 32 + " " * 200 + "zz"]
+)
 def test_what_is_no_key_is_refused_in_a_line(tmp_path, text):
     """And the line does not show what is in the file."""
     path = tmp_path / "k"

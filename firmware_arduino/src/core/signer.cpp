@@ -123,7 +123,7 @@ uint8_t place_of(const Signer& s, const Sender& from) {
 bool signer_set_key(Signer& s, const uint8_t* key, Stamp begin) {
   if (s.mode != Signing::LOCKED && has_key(s, key)) return false;
   use_key(s, key);
-  if (s.mode == Signing::ON) s.wanted = begin > s.now ? begin : s.now;
+  if (s.mode == Signing::ON) s.wanted = begin > s.now && begin <= STAMP_MOST ? begin : s.now;
   s.record[0] = 'H';
   s.record[1] = 'K';
   s.record[2] = KEY_VERSION;
@@ -151,7 +151,7 @@ bool signer_load(Signer& s, StorageRead read, void* storage) {
     use_key(s, s.record + 4);
   }
   if (any) load_stamps(s, read, storage);
-  if (!any && damaged) s.mode = Signing::LOCKED;
+  if (damaged && s.mode == Signing::OFF) s.mode = Signing::LOCKED;  // cut short after one was erased, too
   return s.mode == Signing::LOCKED;
 }
 
@@ -169,6 +169,7 @@ void signer_tick(Signer& s) {
 }
 
 bool signer_is_new(const Signer& s, const Sender& from) {
+  if (from.last == 0 || from.last > STAMP_MOST) return false;
   const uint8_t place = place_of(s, from);
   if (place == SENDERS) return false;
   const Sender& known = s.senders[place];

@@ -24,6 +24,9 @@ constexpr uint8_t SIGNATURE_SIZE = 6;
 constexpr uint8_t STAMP_SIZE = 6;
 constexpr uint8_t SENDERS = 4;
 constexpr Stamp STAMP_MINUTE = 6000000;
+// No clock says more: 48 bits end in 2104, and a board that took their last stamp would hear nobody again. The
+// year behind it is for its own clock.
+constexpr Stamp STAMP_MOST = 0xFFFFFFFFFFFF - 525600 * STAMP_MINUTE;
 // What of a frame is hashed after the key: header, payload, CRC, link id, stamp; room for its padding too.
 constexpr uint8_t SIGNED_PAD = 2 * SHA_BLOCK - KEY_SIZE;
 
@@ -68,8 +71,8 @@ struct Signer {
   bool key_written;      // to be said
 };
 
-// Sets a key: 32 bytes, all zero for none. Its record is to be stored (signer_store). False, and nothing
-// changes, where it is the key in force.
+// Sets a key: 32 bytes, all zero for none; time stamps go on from `begin`, unless that is beyond STAMP_MOST. Its
+// record is to be stored (signer_store). False, and nothing changes, where it is the key in force.
 bool signer_set_key(Signer& s, const uint8_t* key, Stamp begin);
 // What the storage holds; true when that is a damaged key.
 bool signer_load(Signer& s, StorageRead read, void* storage);
@@ -78,7 +81,7 @@ bool signer_store(Signer& s, StoredByte& out);
 // Once a tick: time goes on.
 void signer_tick(Signer& s);
 
-// Whether a frame with this stamp may come from this sender.
+// Whether a frame with this stamp may come from this sender; none has stamp 0, or one beyond STAMP_MOST.
 bool signer_is_new(const Signer& s, const Sender& from);
 // Takes note of a frame that was found good. False when it lies too far ahead to be acted on yet.
 bool signer_take(Signer& s, const Sender& from);
