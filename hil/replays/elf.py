@@ -28,8 +28,9 @@ if TYPE_CHECKING:
     Pwm = list[tuple[int, int]]
 
 _UP_US = 100_000  # the board is up 35 ms after power-up
-_ASKED_US = 120_000
-_ANSWERED_US = 150_000
+# Its clock is asked at five places of a tick: a question that comes while a tick is at work is stamped late.
+_ASKED_US = tuple(range(120_000, 170_000, 10_800))
+_ANSWERED_US = 200_000
 # A step of the pins ends this much before the tick, so that its last edge is counted by then.
 _LEAD_US = 150
 # A frame stamped behind a tick comes at least this much behind it: the board looks for bytes between
@@ -116,15 +117,20 @@ def _time_of_a_tick(board: _pil.Board) -> int:
     Its clock shows multiples of TICK_US at its ticks.
     """
     board.advance_to(_UP_US, _BATTERY_V)
-    asking = FrameWriter().encode(dialect.MAVLink_timesync_message(0, 1))
-    board.receive(_ASKED_US, asking)
+    writer = FrameWriter()
+    for asked_us in _ASKED_US:
+        board.receive(asked_us, writer.encode(dialect.MAVLink_timesync_message(0, asked_us)))
     board.advance_to(_ANSWERED_US, _BATTERY_V)
     reader = FrameReader()
-    for _, chunk in board.take_sent():
-        for msg_id, message, _ in reader.feed(chunk):
-            if msg_id == dialect.MAVLINK_MSG_ID_TIMESYNC:
-                zero_us = _ASKED_US - int(message.tc1) // 1000
-                return zero_us - (zero_us - _ANSWERED_US) // TICK_US * TICK_US
+    zeros_us = [
+        int(message.ts1) - int(message.tc1) // 1000
+        for _, chunk in board.take_sent()
+        for msg_id, message, _ in reader.feed(chunk)
+        if msg_id == dialect.MAVLINK_MSG_ID_TIMESYNC
+    ]
+    if zeros_us:
+        zero_us = max(zeros_us)  # the one that was stamped soonest
+        return zero_us - (zero_us - _ANSWERED_US) // TICK_US * TICK_US
     raise RigFault(
         "the ELF gave no answer to TIMESYNC within 30 ms; build it anew: hil firmware build"
     )
