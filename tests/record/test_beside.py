@@ -1,13 +1,18 @@
-"""The viewer's file from a process beside the run: the same file, and no run needs that process."""
+"""The viewer's file from a process beside the run: the same file, and no run needs that process.
+
+Each is tried in a process of its own, as `hil run` is one: what other tests have left running in this one
+(a thread is enough) would leave the file to be written here.
+"""
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import resource
 import signal
 import subprocess
 import sys
-import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -17,9 +22,15 @@ from hil.record.reader import RunRecord, read_run
 from hil.record.rrd import write_rrd
 from tests.record.synthetic import make_run
 
-pytestmark = pytest.mark.skipif(
-    not hasattr(os, "fork") or threading.active_count() > 1, reason="needs a fork of one thread"
-)
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs a fork")
+
+
+def alone(act: Callable[[Path], None], folder: Path) -> None:
+    """Do it in a new process of one thread; what fails there fails here."""
+    process = multiprocessing.get_context("spawn").Process(target=act, args=(folder,))
+    process.start()
+    process.join()
+    assert process.exitcode == 0, "what it said is on stderr"
 
 
 def printed(path: Path) -> list[str]:
@@ -42,22 +53,30 @@ def beside(viewer: ViewerFile) -> int:
     return viewer._pid
 
 
-def test_it_holds_what_the_file_written_here_holds(run: RunRecord, tmp_path: Path) -> None:
-    """Entities and rows as Rerun reads them; the other process is gone in the end."""
-    write_rrd(tmp_path / "here.rrd", [run])
+def _written_and_gone(folder: Path) -> None:
     with ViewerFile() as viewer:
         pid = beside(viewer)
-        viewer.write(run)
-    assert printed(run.path / "run.rrd") == printed(tmp_path / "here.rrd") != []
+        viewer.write(read_run(folder))
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
 
 
-def test_a_process_that_has_gone_away_is_not_missed(run: RunRecord) -> None:
-    """Killed before it is asked: the file is written here."""
+def test_it_holds_what_the_file_written_here_holds(run: RunRecord, tmp_path: Path) -> None:
+    """Entities and rows as Rerun reads them; the other process is gone in the end."""
+    write_rrd(tmp_path / "here.rrd", [run])
+    alone(_written_and_gone, run.path)
+    assert printed(run.path / "run.rrd") == printed(tmp_path / "here.rrd") != []
+
+
+def _killed_first(folder: Path) -> None:
     with ViewerFile() as viewer:
         os.kill(beside(viewer), signal.SIGKILL)
-        viewer.write(run)
+        viewer.write(read_run(folder))
+
+
+def test_a_process_that_has_gone_away_is_not_missed(run: RunRecord) -> None:
+    """Killed before it is asked: the file is written here."""
+    alone(_killed_first, run.path)
     assert printed(run.path / "run.rrd")
 
 
@@ -66,32 +85,38 @@ def test_a_line_feed_in_a_folders_name_is_a_byte_as_any_other(
 ) -> None:
     """The record whose name is its beginning is left alone."""
     make_run(tmp_path / "run\nx", "pid", rerun=False)
-    with ViewerFile() as viewer:
-        viewer.write(read_run(tmp_path / "run\nx"))
+    alone(_written_and_gone, tmp_path / "run\nx")
     assert printed(tmp_path / "run\nx" / "run.rrd")
     assert not (run.path / "run.rrd").exists()
 
 
-def test_signals_of_the_terminal_are_not_for_it(run: RunRecord) -> None:
-    """Ctrl-C reaches every process of a terminal; the record is finished all the same."""
+def _signalled(folder: Path) -> None:
     with ViewerFile() as viewer:
-        viewer.write(run)  # it is up by then
-        (run.path / "run.rrd").unlink()
+        viewer.write(read_run(folder))  # it is up by then
+        (folder / "run.rrd").unlink()
         os.kill(beside(viewer), signal.SIGINT)
         os.kill(beside(viewer), signal.SIGTERM)
-        viewer.write(run)
+        viewer.write(read_run(folder))
+        os.kill(beside(viewer), 0)
+
+
+def test_signals_of_the_terminal_are_not_for_it(run: RunRecord) -> None:
+    """Ctrl-C reaches every process of a terminal; the record is finished all the same."""
+    alone(_signalled, run.path)
     assert (run.path / "run.rrd").is_file()
+
+
+def _too_large(folder: Path) -> None:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, resource.RLIM_INFINITY))
+    with ViewerFile() as viewer:
+        beside(viewer)
+        with pytest.raises(OSError, match="too large"):
+            viewer.write(read_run(folder))
 
 
 def test_a_file_that_cannot_be_written_is_the_same_error(run: RunRecord) -> None:
     """A limit on the size of files, in force in both processes: OSError, and nothing half-written."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
-    try:
-        with ViewerFile() as viewer, pytest.raises(OSError, match="too large"):
-            viewer.write(run)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    alone(_too_large, run.path)
     assert not list(run.path.glob("run.rrd*"))
 
 
