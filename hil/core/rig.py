@@ -141,3 +141,36 @@ class Rig(Protocol):
 
     def close(self) -> None:
         """Release port and camera; safe to call twice."""
+
+
+class RigAround:
+    """A rig around another, which does what it does; whoever derives from it says what is otherwise."""
+
+    stream: ByteStream
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+
+    def now_s(self) -> float:
+        """Return the host clock (monotonic)."""
+        return self._rig.now_s()
+
+    def wait(self, until_s: float) -> None:
+        """Return at `until_s`, or earlier as soon as bytes or a frame have arrived."""
+        self._rig.wait(until_s)
+
+    def poll_frame(self) -> Frame | None:
+        """Return the oldest frame not yet taken that has arrived by now."""
+        return self._rig.poll_frame()
+
+    def begin(self, t_start_s: float) -> None:
+        """Take note that the controlled part begins."""
+        self._rig.begin(t_start_s)
+
+    def truth(self) -> Truth | None:
+        """Return the true state now, or None where nobody knows it."""
+        return self._rig.truth()
+
+    def close(self) -> None:
+        """Release port and camera; safe to call twice."""
+        self._rig.close()

@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hil.core.errors import BadInput, RigFault
-from hil.core.rig import PORT_BYTES, PortStream, discard_unsent
+from hil.core.rig import PORT_BYTES, PortStream, RigAround, discard_unsent
 
 if TYPE_CHECKING:
-    from hil.core.rig import ByteStream, Frame, Rig, Truth
+    from hil.core.rig import ByteStream, Frame, Rig
     from hil.record.writing import GuardedFile
 
 _HEADER = json.dumps({"format": "hil-tape-1"}).encode() + b"\n"
@@ -95,18 +95,18 @@ class TapedStream:
         discard_unsent(self._stream)
 
 
-class TapedRig:
+class TapedRig(RigAround):
     """A rig whose every answer is taped; otherwise it is the rig itself.
 
     `obey` may raise KeyboardInterrupt; it is called at each wait, before it (`hil.runs.interruption`).
     """
 
     def __init__(self, rig: Rig, tape: TapeWriter, obey: Callable[[], None]) -> None:
+        super().__init__(rig)
         self._obey = obey
-        self._rig = rig
         self._tape = tape
         self._kind = WAITED
-        self.stream: ByteStream = TapedStream(rig.stream, tape)
+        self.stream = TapedStream(rig.stream, tape)
         # These run some hundred times a second: looked up once.
         self._now_s, self._wait, self._poll_frame = rig.now_s, rig.wait, rig.poll_frame
         self._write, self._pack = tape.write, _CLOCK.pack
@@ -134,18 +134,6 @@ class TapedRig:
         if frame is not None:
             self._write(FRAME)
         return frame
-
-    def begin(self, t_start_s: float) -> None:
-        """Take note that the controlled part begins."""
-        self._rig.begin(t_start_s)
-
-    def truth(self) -> Truth | None:
-        """Return the true state now, or None where nobody knows it."""
-        return self._rig.truth()
-
-    def close(self) -> None:
-        """Release the rig."""
-        self._rig.close()
 
 
 @dataclass(frozen=True, slots=True)

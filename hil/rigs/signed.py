@@ -10,13 +10,13 @@ import time
 from typing import TYPE_CHECKING
 
 from hil.core.errors import RigFault
-from hil.core.rig import PORT_BYTES, ByteStream, PortStream, discard_unsent
+from hil.core.rig import PORT_BYTES, ByteStream, PortStream, RigAround, discard_unsent
 from hil.wire.signing import FrameChecker, FrameSigner, Key, stamp_at
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hil.core.rig import Frame, Rig, Truth
+    from hil.core.rig import Rig
 
 # A board that has said this many frames, a second's, and none of them good, will say none.
 _DOUBT_FRAMES = 50
@@ -86,33 +86,9 @@ class SignedStream:
         )
 
 
-class SignedRig:
+class SignedRig(RigAround):
     """A rig whose board has a key; otherwise it is the rig itself."""
 
     def __init__(self, rig: Rig, key: Key) -> None:
-        self._rig = rig
-        self.stream: ByteStream = SignedStream(rig.stream, key)
-
-    def now_s(self) -> float:
-        """Return the host clock (monotonic)."""
-        return self._rig.now_s()
-
-    def wait(self, until_s: float) -> None:
-        """Return at `until_s`, or earlier as soon as bytes or a frame have arrived."""
-        self._rig.wait(until_s)
-
-    def poll_frame(self) -> Frame | None:
-        """Return the oldest frame not yet taken that has arrived by now."""
-        return self._rig.poll_frame()
-
-    def begin(self, t_start_s: float) -> None:
-        """Take note that the controlled part begins."""
-        self._rig.begin(t_start_s)
-
-    def truth(self) -> Truth | None:
-        """Return the true state now, or None where nobody knows it."""
-        return self._rig.truth()
-
-    def close(self) -> None:
-        """Release port and camera; safe to call twice."""
-        self._rig.close()
+        super().__init__(rig)
+        self.stream = SignedStream(rig.stream, key)

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <vector>
 
+#include "estimate_made.hpp"
 #include "pump.hpp"
 
 namespace nb = nanobind;
@@ -242,47 +243,19 @@ void bind_watch(nb::module_& m) {
 }
 
 // An Estimate as its constructor would make it; the class is frozen, and its constructor slow for that.
-class EstimateMaker {
- public:
-  nb::object make(double t_s, const estimator::State& s, const std::array<int, 2>& sides, bool hard) const {
-    const nb::object pose =
-        filled(pose_, {"x_m", "y_m", "theta_rad"},
-               {nb::float_(s.pose.x_m), nb::float_(s.pose.y_m), nb::float_(s.pose.theta_rad)});
-    return filled(estimate_,
-                  {"t_host_s", "pose", "eta1_m_s", "theta_dot_rad_s", "z1_m", "z2_m_s", "z3_m_s2",
-                   "sides_at_limit", "driven_hard"},
-                  {nb::float_(t_s), pose, nb::float_(s.eta1_m_s), nb::float_(s.theta_dot_rad_s),
-                   nb::make_tuple(s.z1_m[0], s.z1_m[1]), nb::make_tuple(s.z2_m_s[0], s.z2_m_s[1]), nb::none(),
-                   nb::make_tuple(sides[0], sides[1]), nb::bool_(hard)});
-  }
-
- private:
-  template <std::size_t N>
-  static nb::object filled(const nb::object& type, const char* const (&names)[N],
-                           const nb::object (&values)[N]) {
-    static PyObject* interned[N] = {};
-    static PyObject* nothing = PyTuple_New(0);
-    PyTypeObject* kind = reinterpret_cast<PyTypeObject*>(type.ptr());
-    const nb::object out = nb::steal(kind->tp_new(kind, nothing, nullptr));
-    for (std::size_t i = 0; i < N; ++i) {
-      if (interned[i] == nullptr) interned[i] = PyUnicode_InternFromString(names[i]);
-      if (PyObject_GenericSetAttr(out.ptr(), interned[i], values[i].ptr()) != 0) throw nb::python_error();
-    }
-    return out;
-  }
-
-  nb::object types_ = nb::module_::import_("hil.core.types");
-  nb::object estimate_ = types_.attr("Estimate"), pose_ = types_.attr("Pose");
-};
-
-const EstimateMaker& estimates() {
-  static const EstimateMaker* maker = new EstimateMaker();  // never freed: the interpreter ends first
-  return *maker;
+const hil::EstimateClass& estimates() {
+  static const hil::EstimateClass* made =
+      new hil::EstimateClass();  // never freed: the interpreter ends first
+  return *made;
 }
 
 nb::object look(Pump& pump, Watch& watch, double now_s, double most_counts, double stall_counts) {
-  const estimator::State& state = pump.look(now_s, most_counts);
-  return estimates().make(now_s + watch.uplink_s, state, pump.sides(), watch.driven_hard(stall_counts));
+  const estimator::State& s = pump.look(now_s, most_counts);
+  const std::array<int, 2> sides = pump.sides();
+  return estimates().of(
+      {now_s + watch.uplink_s, s.pose.x_m, s.pose.y_m, s.pose.theta_rad, s.eta1_m_s, s.theta_dot_rad_s},
+      nb::make_tuple(s.z1_m[0], s.z1_m[1]), nb::make_tuple(s.z2_m_s[0], s.z2_m_s[1]), nb::none(),
+      nb::make_tuple(sides[0], sides[1]), watch.driven_hard(stall_counts));
 }
 
 nb::list others_of(Pump& pump) {
