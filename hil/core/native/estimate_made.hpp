@@ -22,7 +22,8 @@ class FrozenClass {
     PyTypeObject* kind = reinterpret_cast<PyTypeObject*>(kind_.ptr());
     nanobind::object out = nanobind::steal(kind->tp_new(kind, nothing_, nullptr));
     for (std::size_t i = 0; i < N; ++i) {
-      if (PyObject_GenericSetAttr(out.ptr(), fields_[i], values[i].ptr()) != 0) throw nanobind::python_error();
+      if (PyObject_GenericSetAttr(out.ptr(), fields_[i], values[i].ptr()) != 0)
+        throw nanobind::python_error();
     }
     return out;
   }
@@ -45,8 +46,8 @@ class EstimateClass {
                       bool driven_hard) const {
     using nanobind::float_;
     const nanobind::object pose = pose_.of({float_(m.x_m), float_(m.y_m), float_(m.theta_rad)});
-    return estimate_.of({float_(m.t_host_s), pose, float_(m.eta1_m_s), float_(m.theta_dot_rad_s), z1_m, z2_m_s,
-                         z3_m_s2, sides_at_limit, nanobind::bool_(driven_hard)});
+    return estimate_.of({float_(m.t_host_s), pose, float_(m.eta1_m_s), float_(m.theta_dot_rad_s), z1_m,
+                         z2_m_s, z3_m_s2, sides_at_limit, nanobind::bool_(driven_hard)});
   }
 
  private:
