@@ -13,6 +13,15 @@ OTHER_KEY = bytes(range(101, 133))
 # In 2026; a minute in units of 10 us.
 STAMP, MINUTE = 36_000_000_000_000, 6_000_000
 STORING_TICKS = 100
+SETPOINT = dialect.MAVLink_wheel_setpoint_message(5.0, 5.0, 1000)
+ORDERS = {
+    "set-point": SETPOINT,
+    "arming": None,  # of the bench
+    "parameter": dialect.MAVLink_param_set_message(1, 1, b"PWM_MAX", 0.5, 9),
+    "stop": dialect.MAVLink_command_long_message(1, 1, 185, 0, 1, 0, 0, 0, 0, 0, 0),
+    "identity": dialect.MAVLink_command_long_message(1, 1, 512, 0, 24102, 0, 0, 0, 0, 0, 0),
+    "time": dialect.MAVLink_timesync_message(0, 1),
+}
 
 
 class Peer:
