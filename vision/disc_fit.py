@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hil.core.errors import BadInput
 from vision import _marks
 from vision._marks import Disc as Disc  # noqa: PLC0414 - what a fit returns
 from vision.camera import CameraModel
@@ -29,6 +30,18 @@ Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 Point = tuple[float, float]
 Marks = tuple[Disc, Disc]
+
+
+def check_colour(image: Picture) -> None:
+    """Raise BadInput for an image that is not (H, W, 3) uint8: colour marks need colours."""
+    if isinstance(image, np.ndarray) and (
+        image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8 or not image.size
+    ):
+        what = "grey" if image.ndim == 2 else f"of shape {image.shape}"
+        raise BadInput(
+            f"image: {what}, {image.dtype}, must be (H, W, 3) uint8, blue, green and red; a grey"
+            " one does not show colour marks: open it in colour, or use a tag"
+        )
 
 
 def compiled(model: CameraModel) -> _marks.Camera:

@@ -47,7 +47,9 @@ class ManyMarks:
         self._pairs = [
             (
                 (i, j),
-                MarkLocaliser(model, marks.model_copy(update=_two(marks.all[i], marks.all[j]))),
+                MarkLocaliser(
+                    model, marks.model_copy(update=_two(marks.all[i], marks.all[j])), alone=False
+                ),
             )
             for i, j in combinations(range(len(marks.all)), 2)
         ]

@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 Point = tuple[float, float]
 Centres = tuple[Point, Point]
+Places = tuple[list[Point], list[Point]]  # of the front and the rear mark's colour, m
 Window = tuple[int, int, int, int]  # left, top, right, bottom, px
 
 # A mark is this wide at least in the picture it is looked for in, and less than twice that, px.
@@ -109,8 +110,8 @@ class MarkSearch:
         left, top = (edge // self.grid_px * self.grid_px for edge in window[:2])
         return left, top, window[2], window[3]
 
-    def pairs(self, image: Image, window: Window) -> tuple[list[Centres], str]:
-        """Return hypotheses (front, rear centre in m), likeliest first; if none, the reason."""
+    def pairs(self, image: Image, window: Window) -> tuple[list[Centres], Places, str]:
+        """Return hypotheses (front, rear centre in m), likeliest first; all places; if none, the reason."""
         front: list[_marks.Place] = []
         rear: list[_marks.Place] = []
         left, top, right, bottom = self.seen(window)
@@ -126,14 +127,15 @@ class MarkSearch:
                 continue
             middle = 0.5 * (shrink - 1)
             origin_px = (left + middle, top + middle + first * shrink)
-            found = self._search.places(picture[first:last], origin_px, shrink)
-            front.extend(found[0])
-            rear.extend(found[1])
-        for name, places in (("front", front), ("rear", rear)):
-            if not places:
-                return [], f"{name} mark not found"
+            seen = self._search.places(picture[first:last], origin_px, shrink)
+            front.extend(seen[0])
+            rear.extend(seen[1])
+        places = ([(x, y) for x, y, _ in front], [(x, y) for x, y, _ in rear])
+        for name, found in zip(("front", "rear"), places, strict=True):
+            if not found:
+                return [], places, f"{name} mark not found"
         pairs = self._search.pairs(front, rear)
-        return pairs, "marks found, but none the robot's distance apart"
+        return pairs, places, "marks found, but none the robot's distance apart"
 
 
 def _halved(picture: Image) -> Image:

@@ -15,6 +15,7 @@ from hil.core.types import Pose, PoseMeasurement
 from vision.localisers.marks import SAME_PLACE_M, TWO_PLACES
 from vision.localisers.tags import IN_VIEW
 from vision.mark_search import Window
+from vision.rivals import THIRD_MARK
 
 if TYPE_CHECKING:
     from hil.core.rig import Picture
@@ -112,7 +113,7 @@ class SpreadSearch:
     def _take(self, seen: PoseMeasurement) -> None:
         """Keep a find; one where another was, in the strip beside it, takes its place."""
         if seen.pose is None:
-            if seen.reason == TWO_PLACES or seen.reason.endswith(IN_VIEW):
+            if seen.reason in {TWO_PLACES, THIRD_MARK} or seen.reason.endswith(IN_VIEW):
                 self._found.append(seen)
             return
         others = [one for one in self._found if not _same(one, seen)]

@@ -20,9 +20,11 @@ from numpy.typing import NDArray
 from hil.config.camera import MarkConfig, MarksConfig
 from hil.core.types import Pose, PoseMeasurement
 from vision.camera import CameraModel, longest_px
-from vision.disc_fit import Disc, Marks, RimFitter
+from vision.disc_fit import Disc, Marks, RimFitter, check_colour
+from vision.mark_limits import four_cornered, refusal, rough_px
 from vision.mark_search import CHROMA_BASIS, Centres, MarkSearch, Point, Window
 from vision.pose_fit import weighted_pose
+from vision.rivals import THIRD_MARK, Rivals
 
 if TYPE_CHECKING:
     from hil.core.rig import Picture
@@ -30,21 +32,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 # What is accepted.
-SHARE_MIN = 0.4
-# So little of a rim is enough where it has the known radius within so much.
-SHARE_SURE_MIN, GROWTH_SURE = 0.33, 0.03
-GROWTH_MAX = 0.12  # of a rim that is seen whole; less of one
-GROWTH_CUT = 0.4
-GROWTH_DOUBT = 0.5  # more where the rim is rough: noise, blur longer than the profiles
-RESIDUAL_MAX = (
-    0.09  # of the radius, for a rim that is seen whole: blur; a cover leaves the rest sharp
-)
-RESIDUAL_FREE_DN = 10.5  # px at a contrast of 1 DN: a sensor's noise
 DISTANCE_TOLERANCE = 0.04
-# Squares of the same width are four-cornered by 0.5 to 0.9 on average of both, discs to 0.6. What is left
-# out of a square's rim are its corners: less is enough where both rims, or one, are not whole.
-SQUARE_MAX, SQUARE_MAX_CUT, SQUARE_MAX_BOTH_CUT = 0.65, 0.52, 0.42
-WHOLE_SHARE = 0.96
+
 
 # How many degrees of freedom the discs' own claims are worth against that of their distance.
 MISFIT_FREEDOM = 4.0
@@ -70,7 +59,8 @@ class _Found:
 class MarkLocaliser:
     """Finds the robot's two colour marks; holds the configuration, not the past."""
 
-    def __init__(self, model: CameraModel, marks: MarksConfig) -> None:
+    def __init__(self, model: CameraModel, marks: MarksConfig, *, alone: bool = True) -> None:
+        """Take a camera and two marks; `alone` says that the robot carries no further ones."""
         self._model = model
         self._height_m = marks.height_m
         self._radius_m = 0.5 * marks.diameter_m
@@ -83,6 +73,7 @@ class MarkLocaliser:
         self._places = MarkSearch(
             model, self._radius_m, self._height_m, self._distance_m, weights @ CHROMA_BASIS.T
         )
+        self._rivals = Rivals(model, self._rims, marks, self._distance_m) if alone else None
 
     def locate(
         self, image_bgr: Picture, predicted: Pose | None, search_radius_m: float
@@ -90,8 +81,9 @@ class MarkLocaliser:
         """Return the pose seen in an image, (H, W, 3) uint8 BGR.
 
         With a prediction the marks are measured there, else looked for within `search_radius_m`
-        of it, else in the whole frame.
+        of it, else in the whole frame. Raises BadInput for an image without colours.
         """
+        check_colour(image_bgr)
         if predicted is not None:
             seen = self.near(image_bgr, predicted, search_radius_m)
             if seen is not None:
@@ -103,6 +95,7 @@ class MarkLocaliser:
         self, image_bgr: Picture, predicted: Pose, search_radius_m: float
     ) -> PoseMeasurement | None:
         """Return the pose at a prediction or within `search_radius_m` of it, None if not there."""
+        check_colour(image_bgr)
         centres = self._marks_of(predicted)
         found, _ = self._measured(image_bgr, centres)
         if found is None:
@@ -115,6 +108,7 @@ class MarkLocaliser:
         self, image_bgr: Picture, window: Window, predicted: Pose | None = None
     ) -> PoseMeasurement:
         """Return the pose seen in a part of the image; of several alike, the one that is ours."""
+        check_colour(image_bgr)
         finds, reason = self._search(image_bgr, window)
         found = self._ours(finds, predicted)
         if found is None:
@@ -194,7 +188,7 @@ class MarkLocaliser:
         Two at most where nobody said which is ours: one more is one too many.
         """
         looked = image if isinstance(image, np.ndarray) else image.part(self._places.seen(window))
-        pairs, reason = self._places.pairs(looked, window)
+        pairs, places, reason = self._places.pairs(looked, window)
         finds: list[_Found] = []
         why = ""
         for centres in pairs:
@@ -209,6 +203,9 @@ class MarkLocaliser:
             finds = [other for other in finds if other not in rivals] + [best]
             if self._which_m is None and len(finds) > 1:
                 break
+        third = self._rivals if self._which_m is None and len(finds) == 1 else None
+        if third and third.beside(image, finds[0].discs, finds[0].centres_m, places):
+            return [], THIRD_MARK
         return finds, why or reason
 
     # -- fine ----------------------------------------------------------------------------------
@@ -219,10 +216,10 @@ class MarkLocaliser:
         if discs is None:
             return None, "marks have no rim"
         for name, disc in zip(("front", "rear"), discs, strict=True):
-            why = self._refusal(disc)
+            why = refusal(disc, self._ground_ratio_max)
             if why:
                 return None, f"{name} mark: {why}"
-        if _square(discs):
+        if four_cornered(discs):
             return None, "both marks have four corners"
         at = self._model.floor_point
         front, rear = (at(disc.u_px, disc.v_px, self._height_m) for disc in discs)
@@ -246,29 +243,9 @@ class MarkLocaliser:
     def _quality(self, found: _Found) -> float:
         """Return the smaller share of rim times how well rims and distance fit; 1 is whole and sharp."""
         share = min(disc.share for disc in found.discs)
-        sharp = max(_rough_px(disc) / disc.radius_px for disc in found.discs) / QUALITY_RESIDUAL
+        sharp = max(rough_px(disc) / disc.radius_px for disc in found.discs) / QUALITY_RESIDUAL
         misfit = found.gap_m / (DISTANCE_TOLERANCE * self._distance_m)
         return share * math.exp(-0.5 * sharp**2 - misfit**2)
-
-    def _refusal(self, disc: Disc) -> str:
-        """Return why a disc cannot be a mark, "" when it can."""
-        least = SHARE_SURE_MIN if abs(disc.growth) <= GROWTH_SURE else SHARE_MIN
-        if disc.share < least:
-            return f"{disc.share:.0%} of its rim seen, limit {least:.0%}"
-        most = (
-            GROWTH_MAX * (GROWTH_CUT + (1.0 - GROWTH_CUT) * disc.share)
-            + GROWTH_DOUBT * disc.residual_px / disc.radius_px
-        )
-        if not abs(disc.growth) <= most:
-            return f"{1.0 + disc.growth:.2f} of its size, limit 1 +- {most:.2f}"
-        most_px = _free_px(disc) + RESIDUAL_MAX * disc.share**2 * disc.radius_px
-        if not disc.residual_px <= most_px:
-            return f"rim off by {disc.residual_px:.2f} px RMS, limit {most_px:.2f} px"
-        if not disc.ground_ratio <= self._ground_ratio_max:
-            return (
-                f"ground {disc.ground_ratio:.2f} times as bright, limit {self._ground_ratio_max:g}"
-            )
-        return ""
 
     def _measurement(self, found: _Found, *, in_window: bool) -> PoseMeasurement:
         """Return pose, quality (1: both rims whole and sharp) and claimed deviations."""
@@ -330,23 +307,6 @@ def _near(centres_m: Centres, found: _Found, within_m: float) -> bool:
     """Return whether a hypothesis is the one already measured."""
     pairs = zip(centres_m, found.centres_m, strict=True)
     return all(math.dist(a, b) < within_m for a, b in pairs)
-
-
-def _square(discs: Marks) -> bool:
-    """Return whether two marks have four corners each."""
-    cut = sum(disc.share < WHOLE_SHARE for disc in discs)
-    most = (SQUARE_MAX, SQUARE_MAX_CUT, SQUARE_MAX_BOTH_CUT)[cut]
-    return 0.5 * sum(disc.square for disc in discs) > most
-
-
-def _rough_px(disc: Disc) -> float:
-    """Return how far a rim is off its disc beyond a sensor's noise, RMS."""
-    return math.sqrt(max(disc.residual_px**2 - _free_px(disc) ** 2, 0.0))
-
-
-def _free_px(disc: Disc) -> float:
-    """Return how far a noisy sensor's rim is off its disc, RMS: the paler the disc, the more."""
-    return RESIDUAL_FREE_DN / max(disc.contrast_dn, 1.0)
 
 
 def _area_px(disc: Disc) -> float:

@@ -1,0 +1,58 @@
+"""What a measured disc must be like to be one of the robot's marks."""
+
+from __future__ import annotations
+
+import math
+
+from vision.disc_fit import Disc, Marks
+
+SHARE_MIN = 0.4
+# So little of a rim is enough where it has the known radius within so much.
+SHARE_SURE_MIN, GROWTH_SURE = 0.33, 0.03
+GROWTH_MAX = 0.12  # of a rim that is seen whole; less of one
+GROWTH_CUT = 0.4
+GROWTH_DOUBT = 0.5  # more where the rim is rough: noise, blur longer than the profiles
+RESIDUAL_MAX = (
+    0.09  # of the radius, for a rim that is seen whole: blur; a cover leaves the rest sharp
+)
+RESIDUAL_FREE_DN = 10.5  # px at a contrast of 1 DN: a sensor's noise
+# Squares of the same width are four-cornered by 0.5 to 0.9 on average of both, discs to 0.6. What is left
+# out of a square's rim are its corners: less is enough where both rims, or one, are not whole.
+SQUARE_MAX, SQUARE_MAX_CUT, SQUARE_MAX_BOTH_CUT = 0.65, 0.52, 0.42
+WHOLE_SHARE = 0.96
+
+
+def refusal(disc: Disc, ground_ratio_max: float, sizes: float = 1.0) -> str:
+    """Return why a disc cannot be a mark, "" when it can; with `sizes` times the limit of its size."""
+    least = SHARE_SURE_MIN if abs(disc.growth) <= GROWTH_SURE else SHARE_MIN
+    if disc.share < least:
+        return f"{disc.share:.0%} of its rim seen, limit {least:.0%}"
+    most = sizes * (
+        GROWTH_MAX * (GROWTH_CUT + (1.0 - GROWTH_CUT) * disc.share)
+        + GROWTH_DOUBT * disc.residual_px / disc.radius_px
+    )
+    if not abs(disc.growth) <= most:
+        return f"{1.0 + disc.growth:.2f} of its size, limit 1 +- {most:.2f}"
+    most_px = free_px(disc) + RESIDUAL_MAX * disc.share**2 * disc.radius_px
+    if not disc.residual_px <= most_px:
+        return f"rim off by {disc.residual_px:.2f} px RMS, limit {most_px:.2f} px"
+    if not disc.ground_ratio <= ground_ratio_max:
+        return f"ground {disc.ground_ratio:.2f} times as bright, limit {ground_ratio_max:g}"
+    return ""
+
+
+def four_cornered(discs: Marks) -> bool:
+    """Return whether two marks have four corners each."""
+    cut = sum(disc.share < WHOLE_SHARE for disc in discs)
+    most = (SQUARE_MAX, SQUARE_MAX_CUT, SQUARE_MAX_BOTH_CUT)[cut]
+    return 0.5 * sum(disc.square for disc in discs) > most
+
+
+def rough_px(disc: Disc) -> float:
+    """Return how far a rim is off its disc beyond a sensor's noise, RMS."""
+    return math.sqrt(max(disc.residual_px**2 - free_px(disc) ** 2, 0.0))
+
+
+def free_px(disc: Disc) -> float:
+    """Return how far a noisy sensor's rim is off its disc, RMS: the paler the disc, the more."""
+    return RESIDUAL_FREE_DN / max(disc.contrast_dn, 1.0)
