@@ -113,12 +113,12 @@ def sheet_and_disc(x_m, y_m, colour, height_m):
     return sheet, ClutterConfig(x_m=x_m, y_m=y_m, size_m=(0.06, 0.06), height_m=top, colour=colour)
 
 
-def beside_a_green_mark(kind, height_m, seed=7):
-    """Return a look-alike at rest with a red disc 158 mm from its green mark, off its plate."""
+def beside_a_green_mark(kind, height_m, seed=7, away_m=0.158):
+    """Return a look-alike at rest with a red disc beside its green mark, off its plate."""
     place = Pose(-0.1, 0.1, 0.3)
     things = list(look_alike(Random(seed), place, kind))
     green = [thing for thing in things[1:] if thing.colour[1] > thing.colour[2]][-1]
-    x_m, y_m = green.x_m - 0.158 * math.sin(-1.2), green.y_m - 0.158 * math.cos(1.2)
+    x_m, y_m = green.x_m + away_m * math.sin(1.2), green.y_m - away_m * math.cos(1.2)
     return things, green, sheet_and_disc(x_m, y_m, RED, height_m)
 
 
@@ -146,9 +146,20 @@ def test_a_red_disc_beside_a_plate_of_two_green_marks_is_not_told_from_the_robot
 
 
 def test_a_reflection_with_a_red_disc_beside_it_is_not_the_robot():
-    """The robot's image in a shining floor, and a red disc on a dark sheet 158 mm from its green mark."""
-    things, _, disc = beside_a_green_mark("reflection", 0.001)
-    assert look(SceneConfig(clutter=(*things, *disc)), pose=None).pose is None
+    """The robot's image in a shining floor, and a red disc on a dark sheet, as far off as marks seem there.
+
+    A localiser of a robot with further marks, which asks for no third one, takes it.
+    """
+    things, _, disc = beside_a_green_mark("reflection", 0.001, away_m=0.166)
+    camera = CameraConfig(scene=SceneConfig(clutter=(*things, *disc)))
+    image = RenderedCamera(camera, 1).make(0, [])
+    finders = [
+        MarkLocaliser(camera_model(camera), camera.marks, alone=alone) for alone in (True, False)
+    ]
+    alone, among_more = (finder.locate(image, None, 0.06) for finder in finders)
+    assert alone.pose is None
+    assert alone.reason == THIRD_MARK
+    assert among_more.pose is not None
 
 
 def test_the_robot_is_found_beside_discs_that_lie_its_distance_away():
