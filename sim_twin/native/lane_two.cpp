@@ -3,7 +3,8 @@
 #include <emmintrin.h>
 #define TWIN_ROOT(v) _mm_sqrt_pd(v)
 #else
-#define TWIN_ROOT(v) V{std::sqrt(v[0]), std::sqrt(v[1])}
+#define TWIN_ROOT(v) \
+  V { std::sqrt(v[0]), std::sqrt(v[1]) }
 #endif
 #define TWIN_LANES 2
 #define TWIN_RUN run_two

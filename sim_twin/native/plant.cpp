@@ -23,6 +23,7 @@ struct One {
   TWIN_INLINE static Pair pair(double first, double second) { return Pair{first, second}; }
   TWIN_INLINE static Pair root(Pair v) { return twin::root(v); }
   TWIN_INLINE static double root(double v) { return std::sqrt(v); }
+  TWIN_INLINE static Pair over_root(Pair v, Pair x) { return v / twin::root(x); }
   TWIN_INLINE static Pair magnitude(Pair v) { return twin::magnitude(v); }
   TWIN_INLINE static double magnitude(double v) { return std::fabs(v); }
   TWIN_INLINE static double not_negative(double v) { return std::max(v, 0.0); }

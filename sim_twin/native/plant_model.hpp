@@ -50,10 +50,10 @@ struct Model {
 
   using State = PairedState<P>;
   using Loads = typename M::Loads;  // by Load
-  struct Sides {     // left, right
-    P current_dot;   // A/s, one motor
-    P torque_n_m;    // all motors of the side at the wheels, friction and load taken off
-    P rolling_sign;  // smoothed sign of the rim speed
+  struct Sides {                    // left, right
+    P current_dot;                  // A/s, one motor
+    P torque_n_m;                   // all motors of the side at the wheels, friction and load taken off
+    P rolling_sign;                 // smoothed sign of the rim speed
   };
   struct Acceleration {
     N eta1_dot, eta2_dot, theta_ddot;  // m/s^2, m/s^2, rad/s^2, body frame
@@ -73,7 +73,7 @@ struct Model {
   bool slip = false, lifted = false;
 
   // Sign with a soft middle: 0.71 at v = v_s, 0.995 at 10 v_s.
-  TWIN_INLINE static P soft_sign(const P& v, const N& v_s2) { return v / M::root(v * v + v_s2); }
+  TWIN_INLINE static P soft_sign(const P& v, const N& v_s2) { return M::over_root(v, v * v + v_s2); }
 
   // Friction scaled by a change of it: there is none below -1, least of all one that drives.
   TWIN_INLINE static N grip(const Loads& load) { return M::not_negative(1.0 + load[kFrictionChange]); }
