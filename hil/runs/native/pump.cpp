@@ -30,7 +30,7 @@ Pump::Stop Pump::run(bool busy) {
       reports_.clear();
       stage_ = kTake;
       take_bytes();
-      if (busy || !others.empty()) return kHeard;
+      if ((busy && link_.rested(now_s_)) || !others.empty()) return kHeard;
     }
     if (stage_ == kTake) {
       stage_ = kWait;

@@ -27,8 +27,8 @@ class Pump {
       : rig_(rig), link_(link), camera_(camera), fused_(fused), watch_(watch), note_(std::move(note)) {}
 
   // Takes what arrives until until_s, and waits once at least. Stops on the way where messages wait in
-  // `others`, or after each arrival's bytes where a procedure is under way (`busy`): kHeard before, kTaken
-  // after reports and frames were taken.
+  // `others`, or after the bytes of an arrival that the procedure under way (`busy`) may look at, or whose
+  // time-out has come: kHeard before, kTaken after reports and frames were taken.
   Stop begin(double until_s, bool busy);
   Stop go_on(bool busy);
 
