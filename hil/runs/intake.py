@@ -64,7 +64,7 @@ class Intake:
             rig.wait(now_s)
 
     def periods(self, period_s: float, last_s: float) -> None:
-        """Do so period by period until `last_s`, as long as a procedure is under way; or one, to be called anew."""
+        """Do so for a period or more, until `last_s` at most, while a procedure is under way."""
         if self._pump is not None:
             self._go_on(self._pump, self._pump.begin_periods(period_s, last_s))
             return

@@ -31,7 +31,6 @@ def wheel_state(frame: bytes) -> WheelState: ...
 def parameter(frame: bytes) -> tuple[str, float, int, int]:
     """Return name, value, how many there are and index of a PARAM_VALUE."""
 
-
 class WheelReport:
     t_arrival_s: float
     t_board_s: float

@@ -183,7 +183,7 @@ def store(link: BoardLink) -> Procedure:
 def _wait(
     link: BoardLink, done: Callable[[], bool], timeout_s: float
 ) -> Generator[float, None, bool]:
-    """Wait until `done`, which looks at what the board said and at nothing else; return whether it came before the time-out."""
+    """Wait until `done`, which looks at nothing but what the board said; return whether it came in time."""
     end_s = link.t_s + timeout_s
     while not done():
         if link.t_s >= end_s:

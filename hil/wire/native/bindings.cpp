@@ -57,8 +57,7 @@ void bind_wheel_state(nb::module_& m) {
 
 // (name, value, how many there are, index)
 nb::tuple parameter_of(const nb::bytes& frame) {
-  const auto m =
-      wire::payload_of<mavlink_param_value_t>(view(frame), MAVLINK_MSG_ID_PARAM_VALUE_LEN);
+  const auto m = wire::payload_of<mavlink_param_value_t>(view(frame), MAVLINK_MSG_ID_PARAM_VALUE_LEN);
   const std::size_t length = strnlen(m.param_id, sizeof(m.param_id));
   PyObject* name = PyUnicode_DecodeASCII(m.param_id, static_cast<Py_ssize_t>(length), "replace");
   if (name == nullptr) throw nb::python_error();
