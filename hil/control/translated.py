@@ -23,6 +23,7 @@ from hil.control import AsgIsm as AsgBlock
 from hil.control import _outer
 from hil.control.laws.asg_ism import AsgIsm
 from hil.control.laws.chain import Chain
+from hil.control.laws.guard import GuardedLaw
 from hil.control.laws.hold import HoldAtGoal
 from hil.control.laws.let_go import LetGo
 from hil.control.laws.state_feedback import StateFeedback
@@ -94,24 +95,31 @@ def _is_plain(made: object) -> bool:
     return not any(hasattr(kind, name) for name in vars(made))
 
 
-def native_law(law: object, own_terms: tuple[str, ...] = ()) -> _outer.OuterLaw | None:
+StandIn = Callable[[GuardedLaw], _outer.OuterLaw]
+
+
+def native_law(
+    law: object, own_terms: tuple[str, ...] = (), stand_in: StandIn | None = None
+) -> _outer.OuterLaw | None:
     """Return the native law that does what `law` does from its next reset on; None where there is none.
 
     A law in Python under what holds for every law is asked from native code, which keeps `own_terms` of
-    its trace.
+    its trace. `stand_in` gives what stands for one that can answer for several runs at once.
     """
     if not (_as_translated() and _is_whole()) or len(own_terms) > _outer.OWN_TERMS_MOST:
         return None
-    return _law(law, own_terms)
+    return _law(law, own_terms, stand_in)
 
 
-def _law(law: Any, own_terms: tuple[str, ...]) -> _outer.OuterLaw:
+def _law(law: Any, own_terms: tuple[str, ...], stand_in: StandIn | None) -> _outer.OuterLaw:
     kind = type(law)
     around = _AROUND.get(kind)
     if around is not None and _is_plain(law):
-        return around(_law(law._law, own_terms), law)
+        return around(_law(law._law, own_terms, stand_in), law)
     if is_translated(law):
         return _outer.law(kind.__name__, law._gains, law._limits, law._d0)
+    if stand_in is not None and kind is GuardedLaw and law.makes_batches:
+        return stand_in(law)
     return _outer.python_law(law, own_terms)
 
 

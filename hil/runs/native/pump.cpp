@@ -12,17 +12,17 @@ std::string odd_stamp(double ahead_s) {
   return "stamped earlier than a frame before it, or not at all";
 }
 
-Pump::Stop Pump::begin(double until_s, bool busy) {
+Pump::Stop Pump::begin(double until_s, bool busy, bool apart) {
   until_s_ = until_s;
   waited_ = false;
   stage_ = kLook;
-  return run(busy);
+  return run(busy, apart);
 }
 
-Pump::Stop Pump::go_on(bool busy) { return run(busy); }
+Pump::Stop Pump::go_on(bool busy, bool apart) { return run(busy, apart); }
 
-Pump::Stop Pump::run(bool busy) {
-  while (true) {
+Pump::Stop Pump::run(bool busy, bool apart) {
+  while (stage_ != kOver) {
     if (stage_ == kLook) {
       now_s_ = rig_.now_s();
       watch_.supervisor.check_clock(now_s_);
@@ -42,12 +42,14 @@ Pump::Stop Pump::run(bool busy) {
       while (rig_.take_frame(frame)) take_frame(frame);
       if (!others.empty()) return kTaken;
     }
-    stage_ = kLook;
-    if (now_s_ >= until_s_) break;
-    rig_.wait(until_s_);
+    const bool over = now_s_ >= until_s_;
+    if (over && waited_) break;
+    stage_ = over ? kOver : kLook;
     waited_ = true;
+    away_until_s_ = over ? now_s_ : until_s_;
+    if (apart) return kAway;
+    rig_.wait(away_until_s_);
   }
-  if (!waited_) rig_.wait(now_s_);
   return kReached;
 }
 
