@@ -199,7 +199,8 @@ class Session:
             self._check_safety(now_s)
             estimate = self._estimate(now_s)
             reference = self._parts.reference.at(estimate.t_host_s - self._t0_s)
-            yield Situation(now_s - self._t0_s, reference, estimate)
+            if asked is None:
+                yield Situation(now_s - self._t0_s, reference, estimate)
             if tick == 0:
                 law.reset(reference, estimate)
             self._parts.orders.at_tick(reference, estimate)
