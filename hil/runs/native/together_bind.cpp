@@ -83,16 +83,15 @@ void bind_together(nb::module_& m) {
       .def(
           "go_on",
           [](Together& together, std::size_t place, bool busy, bool refused, const nb::tuple& board) {
-            together.go_on(place, busy, refused,
-                           {nb::cast<std::int64_t>(board[0]), nb::cast<double>(board[1]),
-                            nb::cast<double>(board[2])});
+            together.go_on(
+                place, busy, refused,
+                {nb::cast<std::int64_t>(board[0]), nb::cast<double>(board[1]), nb::cast<double>(board[2])});
           },
           "place"_a, "busy"_a, "refused"_a, "board"_a)
       .def("answered", &Together::answered, "place"_a)
       .def("run", &Together::run)
       .def_prop_ro("waiting", &Together::waiting)
       .def("end", &Together::end, "place"_a)
-      .def(
-          "rethrow", [](Together& together, std::size_t place) { together.rethrow(place); }, "place"_a);
+      .def("rethrow", [](Together& together, std::size_t place) { together.rethrow(place); }, "place"_a);
   m.attr("FAILED") = static_cast<int>(Together::kFailed);
 }
