@@ -15,6 +15,7 @@ import math
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module
+from operator import itemgetter
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -59,7 +60,12 @@ def _taken(owner: Any) -> dict[str, Any]:
     }
 
 
-_PARTS = [(owner, [*taken], [*taken.values()]) for owner in _owners() if (taken := _taken(owner))]
+# What an owner has, how its parts are read from that (two at least: a tuple), and what they were.
+_PARTS = [
+    (vars(owner), itemgetter(*taken, "__doc__"), (*taken.values(), owner.__doc__))
+    for owner in _owners()
+    if (taken := _taken(owner))
+]
 _FUNCTIONS = [v for _, _, values in _PARTS for v in values if isinstance(v, FunctionType)]
 _CODES = [function.__code__ for function in _FUNCTIONS]
 
@@ -85,7 +91,10 @@ def _pairs() -> list[tuple[float, float]]:
 
 def _is_whole() -> bool:
     """Say whether nobody has replaced a function or a number since."""
-    parts = all([*map(vars(owner).get, names)] == values for owner, names, values in _PARTS)
+    try:
+        parts = all(read(owned) == values for owned, read, values in _PARTS)
+    except KeyError:  # one is gone
+        return False
     return parts and [function.__code__ for function in _FUNCTIONS] == _CODES
 
 
@@ -98,20 +107,34 @@ def _is_plain(made: object) -> bool:
 StandIn = Callable[[GuardedLaw], _outer.OuterLaw]
 
 
-def native_law(
-    law: object, own_terms: tuple[str, ...] = (), stand_in: StandIn | None = None
-) -> _outer.OuterLaw | None:
-    """Return the native law that does what `law` does from its next reset on; None where there is none.
+def native_forms(
+    law: object,
+    reference: object,
+    own_terms: tuple[str, ...] = (),
+    stand_in: StandIn | None = None,
+) -> tuple[_outer.OuterLaw, _outer.Reference] | None:
+    """Return both for a run, as `native_law` and `native_reference` give them; None where one has none.
 
-    A law in Python under what holds for every law is asked from native code, which keeps `own_terms` of
-    its trace. `stand_in` gives what stands for one that can answer for several runs at once.
+    `stand_in` gives what stands for a law that can answer for several runs at once.
     """
     if not (_as_translated() and _is_whole()) or len(own_terms) > _outer.OWN_TERMS_MOST:
         return None
-    return _law(law, own_terms, stand_in)
+    found = _reference(reference)
+    return None if found is None else (_law(law, own_terms, stand_in), found)
 
 
-def _law(law: Any, own_terms: tuple[str, ...], stand_in: StandIn | None) -> _outer.OuterLaw:
+def native_law(law: object, own_terms: tuple[str, ...] = ()) -> _outer.OuterLaw | None:
+    """Return the native law that does what `law` does from its next reset on; None where there is none.
+
+    A law in Python under what holds for every law is asked from native code, which keeps `own_terms` of
+    its trace.
+    """
+    if not (_as_translated() and _is_whole()) or len(own_terms) > _outer.OWN_TERMS_MOST:
+        return None
+    return _law(law, own_terms)
+
+
+def _law(law: Any, own_terms: tuple[str, ...], stand_in: StandIn | None = None) -> _outer.OuterLaw:
     kind = type(law)
     around = _AROUND.get(kind)
     if around is not None and _is_plain(law):
@@ -151,8 +174,12 @@ _REFERENCES = {Point, Circle, Waypoints, Stops}
 
 def native_reference(reference: Any) -> _outer.Reference | None:
     """Return the native reference that is the same motion; None where there is none."""
+    return _reference(reference) if _as_translated() and _is_whole() else None
+
+
+def _reference(reference: Any) -> _outer.Reference | None:
     kind = type(reference)
-    if kind not in _REFERENCES or not (_as_translated() and _is_whole() and _is_plain(reference)):
+    if kind not in _REFERENCES or not _is_plain(reference):
         return None
     if kind is Point:
         return _outer.point(reference._state)
