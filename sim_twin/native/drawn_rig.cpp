@@ -12,10 +12,26 @@ bool within(const Span& span, double t_s) { return span.first <= t_s && t_s < sp
 }  // namespace
 
 void DrawnRig::wait(double until_s) {
+  do {
+    move(until_s);
+  } while (!arrived(until_s));
+}
+
+void DrawnRig::move(double until_s) {
   try {
-    rig_.wait(until_s, 1);
+    rig_.advance(until_s);
   } catch (const std::runtime_error& error) {
     throw core::RigFault(std::string("twin: ") + error.what() + "; check the robot's parameters");
+  }
+}
+
+void DrawnRig::move_together(Wait* waits, std::size_t count) {
+  for (Wait* wait = waits; wait != waits + count; ++wait) {
+    try {
+      wait->rig->move(wait->until_s);
+    } catch (...) {
+      wait->failed = std::current_exception();
+    }
   }
 }
 
