@@ -5,7 +5,7 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "lane_block.hpp"
+#include "lane_seat.hpp"
 
 namespace twin {
 namespace {
@@ -159,19 +159,11 @@ class Lanes {
   }
 
   void load_robot(int lane, const Kernel& kernel) {
-    const Plant& plant = kernel.plant();
-#define X(name) block_.terms.name[lane] = plant.terms().name;
-    TWIN_TERMS(X)
-#undef X
-    const double h_s = 1e-6 * static_cast<double>(kernel.step_us());
-    block_.castor[lane] = plant.castor() ? 1.0 : 0.0;
-    block_.h_s[lane] = h_s;
-    block_.half_h_s[lane] = 0.5 * h_s;
-    block_.sixth_h_s[lane] = h_s / 6.0;
+    seat_robot(block_, lane, kernel.plant(), 1e-6 * static_cast<double>(kernel.step_us()));
   }
 
   void load_state(int lane, const Kernel& kernel) {
-    for (int i = 0; i < kStates; ++i) block_.x[i][lane] = kernel.state()[i];
+    seat_state(block_, lane, kernel.state());
     load_duty(lane, kernel);
   }
 
@@ -180,9 +172,8 @@ class Lanes {
       block_.duty[side][lane] = kernel.drive().duty[side];
       block_.jam[side][lane] = kernel.drive().jam[side];
     }
-    const bool loaded = kernel.acted_on();
-    if (seats_[lane].loaded && !loaded) set_loads(lane, {});
-    seats_[lane].loaded = loaded;
+    if (seats_[lane].loaded) set_loads(lane, {});  // those of before, or of another kernel
+    seats_[lane].loaded = kernel.acted_on();
     seats_[lane].sag_v = 0.0;
   }
 
@@ -248,16 +239,20 @@ std::vector<Width> widths() {
   return out;
 }
 
+void require_width(Width width) {
+  const std::vector<Width> has = widths();
+  if (std::find(has.begin(), has.end(), width) == has.end()) {
+    throw std::invalid_argument("this processor has no registers of that width");
+  }
+}
+
 void advance_together(Leg* legs, std::size_t n) {
   static const Width widest = widths().back();
   advance_together(legs, n, widest);
 }
 
 void advance_together(Leg* legs, std::size_t n, Width width) {
-  const std::vector<Width> has = widths();
-  if (std::find(has.begin(), has.end(), width) == has.end()) {
-    throw std::invalid_argument("this processor has no registers of that width");
-  }
+  require_width(width);
   for (std::size_t i = 0; i < n; ++i) {
     legs[i].failed = nullptr;
     legs[i].together = 0;
