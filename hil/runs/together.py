@@ -57,6 +57,19 @@ def run_together(makers: Sequence[Callable[[], InMemory]]) -> list[Result]:
                 run.close()
 
 
+def figures_together(
+    makers: Sequence[Callable[[], InMemory]],
+) -> list[dict[str, float] | None]:
+    """Return the figures of such runs, None of one that ends early; raises what making one raised."""
+    found: list[dict[str, float] | None] = []
+    for record in run_together(makers):
+        if isinstance(record, BaseException):
+            raise record
+        done = record.manifest.outcome == "complete"
+        found.append(record.figures().values if done else None)
+    return found
+
+
 def _record(run: InMemory) -> Result:
     try:
         return run.record()
