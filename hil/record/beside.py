@@ -2,7 +2,9 @@
 
 Loading that code takes a third of a short run's time, and nothing of the run depends on it: a fork of this
 process does it on another core, waits for the finished tables, and writes `run.rrd` from them. Where that
-process cannot be had, or has gone away, the file is written here as ever.
+process cannot be had, has gone away, or does not know the run's law, the file is written here as ever.
+
+This module loads what both processes need, and a command enters it before it loads the rest.
 """
 
 from __future__ import annotations
@@ -101,8 +103,10 @@ def _serve(asked: int, told: int) -> NoReturn:
     try:
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):  # the record's end is its parent's affair
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-        from hil.record.rrd import write_rrd  # noqa: PLC0415 - what this process is for
+        from hil.core.registries import OUTER_LAWS  # noqa: PLC0415 - loading is what this process is for
+        from hil.record.rrd import write_rrd  # noqa: PLC0415
 
+        OUTER_LAWS.names()
         heard = b""
         while piece := os.read(asked, _NAME_BYTES):
             heard += piece
@@ -116,8 +120,13 @@ def _serve(asked: int, told: int) -> NoReturn:
 
 
 def _written(write_rrd: Any, folder: Path) -> bytes:
+    from hil.core.registries import OUTER_LAWS  # noqa: PLC0415
+
     try:
-        write_rrd(folder / layout.RERUN, [read_run(folder)])
+        run = read_run(folder)
+        if run.manifest.outer not in OUTER_LAWS.names():
+            return b"a law from a file"  # its colour is known to those who have read that
+        write_rrd(folder / layout.RERUN, [run])
     except OSError as error:
         return f"{error.errno or 5} {error.strerror or error}".encode()
     return _DONE
