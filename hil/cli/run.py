@@ -82,7 +82,7 @@ def command(
     """
     if record_camera and small_video:
         raise click.UsageError("--record-camera and --record-camera-small: choose one")
-    with _viewer_file(target, outer) as viewer:
+    with _viewer_file(target) as viewer:
         from hil.config.load import load_scenario
         from hil.core.registries import OUTER_LAWS
         from hil.record.manifest import command_line
@@ -125,15 +125,11 @@ def command(
     return exit_status(record)
 
 
-def _viewer_file(target: str, outer: str | None) -> AbstractContextManager[ViewerFile | None]:
+def _viewer_file(target: str) -> AbstractContextManager[ViewerFile | None]:
     """Give the process beside the run; once it is entered, that and the command load side by side."""
-    from hil.core.registries import OUTER_LAWS
-    from hil.core.registry import is_file_name
     from hil.record.beside import ViewerFile
     from hil.rigs.opening import is_simulated
 
-    if outer is not None and is_file_name(outer):
-        OUTER_LAWS.get(outer)  # whose colour that process has to know
     return ViewerFile() if is_simulated(target) else nullcontext()
 
 
