@@ -20,6 +20,9 @@ RESIDUAL_FREE_DN = 10.5  # px at a contrast of 1 DN: a sensor's noise
 # out of a square's rim are its corners: less is enough where both rims, or one, are not whole.
 SQUARE_MAX, SQUARE_MAX_CUT, SQUARE_MAX_BOTH_CUT = 0.65, 0.52, 0.42
 WHOLE_SHARE = 0.96
+# A wrong height changes size and distance alike; blur, focus and gamma the size alone, by 5 % at most
+# beyond the noise in all conditions of the bench, and scissors by some more.
+SCALE_MAX, SCALE_SIGMAS = 0.065, 2.5
 
 
 def refusal(disc: Disc, ground_ratio_max: float, sizes: float = 1.0) -> str:
@@ -46,6 +49,25 @@ def four_cornered(discs: Marks) -> bool:
     cut = sum(disc.share < WHOLE_SHARE for disc in discs)
     most = (SQUARE_MAX, SQUARE_MAX_CUT, SQUARE_MAX_BOTH_CUT)[cut]
     return 0.5 * sum(disc.square for disc in discs) > most
+
+
+def scale_refusal(discs: Marks, gap_ratio: float) -> str:
+    """Return why two discs are not the robot's marks from whatever height, "" when they may be.
+
+    `gap_ratio` is how far their distance is off the robot's, relative.
+    """
+    growth = 0.5 * (discs[0].growth + discs[1].growth)
+    variance = sum(
+        0.5 * (disc.covariance_px2[0] + disc.covariance_px2[2]) / disc.radius_px**2
+        for disc in discs
+    )
+    most = SCALE_MAX + SCALE_SIGMAS * 0.5 * math.sqrt(variance)
+    if abs(growth - gap_ratio) <= most:
+        return ""
+    return (
+        f"marks {1.0 + growth:.3f} of their size and {1.0 + gap_ratio:.3f} of their distance,"
+        f" limit {most:.3f} apart"
+    )
 
 
 def rough_px(disc: Disc) -> float:

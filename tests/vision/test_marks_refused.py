@@ -173,3 +173,22 @@ def test_the_robot_is_found_beside_discs_that_lie_its_distance_away():
     seen = look(SceneConfig(clutter=tuple(things)))
     assert seen.pose is not None
     assert math.dist((seen.pose.x_m, seen.pose.y_m), TRUTH[:2]) < 0.001
+
+
+@pytest.mark.parametrize(("away_m", "seen"), [(0.1664, False), (0.160, True)])
+def test_discs_too_small_for_their_distance_are_not_the_robot(away_m, seen):
+    """Discs of 57 mm on dark sheets, 4 % too far apart, are not one thing from a wrong height.
+
+    At the robot's distance they are its marks, cut small.
+    """
+    half = 0.5 * away_m
+    things = [
+        part
+        for x_m, colour in ((-half, GREEN), (half, RED))
+        for part in sheet_and_disc(x_m, 0.0, colour, 0.099)
+    ]
+    small = [
+        t.model_copy(update={"size_m": (0.057, 0.057)}) if t.shape == "disc" else t for t in things
+    ]
+    found = look(SceneConfig(clutter=tuple(small)), pose=None)
+    assert (found.pose is not None) == seen

@@ -21,7 +21,7 @@ from hil.config.camera import MarkConfig, MarksConfig
 from hil.core.types import Pose, PoseMeasurement
 from vision.camera import CameraModel, longest_px
 from vision.disc_fit import Disc, Marks, RimFitter, check_colour
-from vision.mark_limits import four_cornered, refusal, rough_px
+from vision.mark_limits import four_cornered, refusal, rough_px, scale_refusal
 from vision.mark_search import CHROMA_BASIS, Centres, MarkSearch, Point, Window
 from vision.pose_fit import weighted_pose
 from vision.rivals import THIRD_MARK, Rivals
@@ -235,10 +235,15 @@ class MarkLocaliser:
                 f"marks {own_mm + 1e3 * gap_m:.0f} mm apart, the robot's are {own_mm:.0f} mm",
             )
         found = _Found(discs, (front, rear), gap_m, spreads)
+        why = scale_refusal(discs, gap_m / self._distance_m) or self._poor(found)
+        return (None, why) if why else (found, "")
+
+    def _poor(self, found: _Found) -> str:
+        """Return why a find is hardly within each limit, "" when it is well within some."""
         quality = self._quality(found)
-        if not quality >= QUALITY_MIN:
-            return None, f"rims and distance fit badly together: {quality:.3f}, limit {QUALITY_MIN}"
-        return found, ""
+        if quality >= QUALITY_MIN:
+            return ""
+        return f"rims and distance fit badly together: {quality:.3f}, limit {QUALITY_MIN}"
 
     def _quality(self, found: _Found) -> float:
         """Return the smaller share of rim times how well rims and distance fit; 1 is whole and sharp."""
