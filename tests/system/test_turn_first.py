@@ -115,6 +115,24 @@ def test_the_verdict_names_the_turn_that_the_motors_do_not_make():
     assert not any("torque" in text for text in run("pid").diagnoses())
 
 
+@pytest.mark.parametrize("outer", ["asg-ism", "pid"])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        ("robot.mass_kg=6",),
+        ("robot.wheel_radius_m=0.096",),
+        ("robot.battery.charge_start_ratio=0.1", "robot.floor.friction_ratio=1.07"),
+    ],
+    ids=["6 kg", "wheels of 96 mm", "battery at 10 %"],
+)
+def test_a_robot_that_cannot_turn_is_no_complete_run(changes, outer):
+    """Too heavy, geared too tall or out of charge: the run ends early, fails, and says that it is the turn."""
+    record = run(outer, *changes)
+    assert record.manifest.outcome != "complete"
+    assert not all(found.holds for found in record.verdicts())
+    assert any("the turn needs more torque" in text for text in record.diagnoses())
+
+
 def test_usual_runs_are_hardly_touched():
     """On the usual floor forward speed gives way for a few ticks of the start alone: IAE within 1 %."""
     one, two = (run("asg-ism", *more).figures().values["iae_m_s"] for more in ((), (NEVER,)))
