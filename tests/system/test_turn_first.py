@@ -126,7 +126,7 @@ def test_the_verdict_names_the_turn_that_the_motors_do_not_make():
     ids=["6 kg", "wheels of 96 mm", "battery at 10 %"],
 )
 def test_a_robot_that_cannot_turn_is_no_complete_run(changes, outer):
-    """Too heavy, geared too tall or out of charge: the run ends early, fails, and says that it is the turn."""
+    """Too heavy, geared too tall or out of charge: the run ends early and says that it is the turn."""
     record = run(outer, *changes)
     assert record.manifest.outcome != "complete"
     assert not all(found.holds for found in record.verdicts())

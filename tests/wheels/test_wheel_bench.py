@@ -174,7 +174,9 @@ def test_what_was_found_is_judged_robot_by_robot():
     assert against["found"].certain
     assert against["defaults"].mean == pytest.approx(0.5 / 3)
     lines = wheel_tune.as_lines({"asg-ism": own, "pid": pid})
-    assert lines[0].startswith("asg-ism: 0.6000 as found, 0.6667 with the board's defaults, -0.0667")
+    assert lines[0].startswith(
+        "asg-ism: 0.6000 as found, 0.6667 with the board's defaults, -0.0667"
+    )
     assert "minus pid as found +0.1000 (+0.1000 to +0.1000)" in lines[0]
     assert "minus" not in lines[1]
 
