@@ -92,11 +92,11 @@ def test_a_side_at_its_limit_lacks_speed_in_its_direction():
     assert sides((380, 0), (2.0, 0.0), (8.0, 0.0)) == (0, 0)
 
 
-def run(outer, *overrides):
+def run(outer, *overrides, seed=3):
     """Return the record of scenario-1 on the twin."""
     scenario = load_scenario("scenario-1", overrides)
     return execute_in_memory(
-        RunSpec(scenario, "twin", "pose", outer, "asg-ism", 3, Path(), rerun=False)
+        RunSpec(scenario, "twin", "pose", outer, "asg-ism", seed, Path(), rerun=False)
     )
 
 
@@ -106,6 +106,22 @@ def test_on_a_floor_with_grip_the_turn_is_made_sooner(outer):
     with_it, without = (run(outer, *GRIP, *more).figures().values for more in ((), (NEVER,)))
     assert with_it["delta1_worst_last_second_m"] < 0.02
     assert with_it["iae_m_s"] < 0.82 * without["iae_m_s"]
+
+
+@pytest.mark.parametrize("outer", ["asg-ism", "pid"])
+def test_a_floor_with_grip_is_held_where_speed_gives_way_sooner(outer):
+    """Friction 0.77, the point behind on the left: at rest within 20 mm once 0.3 rad/s missing suffice.
+
+    Negative control: where speed does not give way the wheels stand against each other until the board stops.
+    """
+    start = ("start.x_m=0.466", "start.y_m=-0.240", "start.theta_rad=0.028")
+    grip = ("robot.floor.friction_ratio=0.77", *start)
+    for seed in (138, 139):
+        sooner = run(outer, *grip, "control.limits.turn_missing_rad_s=0.3", seed=seed)
+        assert sooner.manifest.outcome == "complete"
+        assert sooner.figures().values["delta1_worst_last_second_m"] < 0.02
+        kept = run(outer, *grip, NEVER, seed=seed)
+        assert "STALL" in kept.manifest.outcome_detail
 
 
 def test_the_verdict_names_the_turn_that_the_motors_do_not_make():
