@@ -32,7 +32,7 @@ def judged_anew(data, workers=1):
             return pool.map(jobs, lambda *_: None)
 
         yard = Yardstick.measured(field.tasks, make)
-        if {task: dict(figures) for task, figures in yard.figures.items()} != data["yardstick"]:
+        if any(dict(now) != data["yardstick"][task] for task, now in yard.figures.items()):
             raise SystemExit("the yardstick is another one by now: make the verdict anew")
         found = shipped_scores(field, plan, yard, make)
     return data | {"shipped": found, "shipped_gains": shipped_gains(field.laws)}
