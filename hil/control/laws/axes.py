@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from random import Random
 from typing import TYPE_CHECKING
 
@@ -66,13 +67,22 @@ class TurnedAxes:
     def _back(self, trace: Mapping[str, float]) -> dict[str, float]:
         """Return the trace with each pair of terms NAME_x..., NAME_y... in the axes of the world."""
         found = dict(trace)
-        for name, x in trace.items():
-            other = name.replace("_x_", "_y_") if "_x_" in name else f"{name[:-1]}y"
-            if ("_x_" in name or name.endswith("_x")) and other in trace:
-                y = trace[other]
-                found[name] = self._cos * x - self._sin * y
-                found[other] = self._sin * x + self._cos * y
+        for name, other in _pairs(tuple(trace)):
+            x, y = trace[name], trace[other]
+            found[name] = self._cos * x - self._sin * y
+            found[other] = self._sin * x + self._cos * y
         return found
+
+
+@cache
+def _pairs(names: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+    """Return which terms of a trace are X and Y of one vector."""
+    found = []
+    for name in names:
+        other = name.replace("_x_", "_y_") if "_x_" in name else f"{name[:-1]}y"
+        if ("_x_" in name or name.endswith("_x")) and other in names:
+            found.append((name, other))
+    return tuple(found)
 
 
 def in_axes(law: OuterLaw, angle_rad: float) -> OuterLaw:
