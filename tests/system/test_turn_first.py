@@ -124,6 +124,19 @@ def test_a_floor_with_grip_is_held_where_speed_gives_way_sooner(outer):
         assert "STALL" in kept.manifest.outcome_detail
 
 
+def test_a_turn_about_the_point_is_a_limit_of_the_default():
+    """Found by `hil falsify`: at 1.62 of the believed friction PID turns by more than half a turn, or back.
+
+    With 0.3 rad/s missing as the threshold it turns as far as the point asks for.
+    """
+    floor = "mismatch.floor.friction_ratio=1.623"
+    for seed in (1, 2, 3):
+        turned = run("pid", floor, seed=seed).figures().values["turn_rad"]
+        assert not -3.1416 <= turned <= -0.2
+        sooner = run("pid", floor, "control.limits.turn_missing_rad_s=0.3", seed=seed)
+        assert all(found.holds for found in sooner.verdicts())
+
+
 def test_the_verdict_names_the_turn_that_the_motors_do_not_make():
     """Friction 0.9: the side, its share of the run, what was made of the turn; none on the usual floor."""
     told = run("pid", "robot.floor.friction_ratio=0.9").diagnoses()
