@@ -281,8 +281,8 @@ def _own(data: Data, level: float) -> str:
 def shipped_table(data: Data) -> list[str]:
     """Return what the gains that ship are worth in the unseen cells, the most accurate first.
 
-    The last column is accuracy against the baseline's, cell by cell on the logarithm as in `compared`, but not at
-    equal calm; bold where it stands among the table's (false discovery rate of 5 %).
+    The last column is accuracy against the baseline's, cell by cell on the logarithm as in `compared`, but
+    not at equal calm; bold where it stands among the table's (false discovery rate of 5 %).
     """
     cells = data["unseen_cells"]
     scores = {

@@ -1,6 +1,7 @@
 """Put what the verdict's data say into README and docs: `python -m tests.verdict.pages`, after a new verdict.
 
-Between the marks <!-- verdict --> and <!-- /verdict --> (and ablation, shipped) the pages hold what is made here.
+Between the marks <!-- verdict --> and <!-- /verdict --> (and ablation, shipped) the pages hold what is
+made here.
 """
 
 import json
