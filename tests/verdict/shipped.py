@@ -1,7 +1,8 @@
 """Judge the gains that ship anew in the data of the verdicts: `python -m tests.verdict.shipped`.
 
-After new gains. The fronts stay as they were searched, and so does all that the verdict says. Refused where the
-yardstick is another one by now: then all of it is to be made anew, with the command that stands in the data.
+After new gains. The fronts stay as they were searched, and so does all that the verdict says. Refused
+where the yardstick is another one by now: then all of it is to be made anew, with the command that
+stands in the data.
 """
 
 import json
