@@ -216,7 +216,6 @@ class DrawnPoses:
         error: Sequence[float],
         swapped: bool,
         shift_m: float,
-        places: Sequence[Sequence[tuple[float, float, float, float]]],
         chance: Sequence[int],
     ) -> None: ...
     def measure(

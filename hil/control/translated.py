@@ -15,6 +15,7 @@ import math
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module
+from operator import itemgetter
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -58,7 +59,12 @@ def _taken(owner: Any) -> dict[str, Any]:
     }
 
 
-_PARTS = [(owner, [*taken], [*taken.values()]) for owner in _owners() if (taken := _taken(owner))]
+# What an owner has, how its parts are read from that (two at least: a tuple), and what they were.
+_PARTS = [
+    (vars(owner), itemgetter(*taken, "__doc__"), (*taken.values(), owner.__doc__))
+    for owner in _owners()
+    if (taken := _taken(owner))
+]
 _FUNCTIONS = [v for _, _, values in _PARTS for v in values if isinstance(v, FunctionType)]
 _CODES = [function.__code__ for function in _FUNCTIONS]
 
@@ -84,7 +90,10 @@ def _pairs() -> list[tuple[float, float]]:
 
 def _is_whole() -> bool:
     """Say whether nobody has replaced a function or a number since."""
-    parts = all([*map(vars(owner).get, names)] == values for owner, names, values in _PARTS)
+    try:
+        parts = all(read(owned) == values for owned, read, values in _PARTS)
+    except KeyError:  # one is gone
+        return False
     return parts and [function.__code__ for function in _FUNCTIONS] == _CODES
 
 
@@ -92,6 +101,16 @@ def _is_plain(made: object) -> bool:
     """Say whether an object hides nothing of its class."""
     kind = type(made)
     return not any(hasattr(kind, name) for name in vars(made))
+
+
+def native_forms(
+    law: object, reference: object, own_terms: tuple[str, ...] = ()
+) -> tuple[_outer.OuterLaw, _outer.Reference] | None:
+    """Return both for a run, as `native_law` and `native_reference` give them; None where one has none."""
+    if not (_as_translated() and _is_whole()) or len(own_terms) > _outer.OWN_TERMS_MOST:
+        return None
+    found = _reference(reference)
+    return None if found is None else (_law(law, own_terms), found)
 
 
 def native_law(law: object, own_terms: tuple[str, ...] = ()) -> _outer.OuterLaw | None:
@@ -143,8 +162,12 @@ _REFERENCES = {Point, Circle, Waypoints, Stops}
 
 def native_reference(reference: Any) -> _outer.Reference | None:
     """Return the native reference that is the same motion; None where there is none."""
+    return _reference(reference) if _as_translated() and _is_whole() else None
+
+
+def _reference(reference: Any) -> _outer.Reference | None:
     kind = type(reference)
-    if kind not in _REFERENCES or not (_as_translated() and _is_whole() and _is_plain(reference)):
+    if kind not in _REFERENCES or not _is_plain(reference):
         return None
     if kind is Point:
         return _outer.point(reference._state)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from hil.control import _outer
 from hil.control.estimators.geometry import BelievedGeometry
-from hil.control.translated import native_law, native_reference
+from hil.control.translated import native_forms
 from hil.record.memory import MemoryRecorder
 from hil.record.schema import TRACE_KEYS
 from hil.runs import _native
@@ -39,10 +39,10 @@ def make_drive(
         return None
     if type(geometry) is not BelievedGeometry:
         return None
-    law = native_law(parts.law, parts.own_terms)
-    reference = native_reference(parts.reference)
-    if law is None or reference is None:
+    forms = native_forms(parts.law, parts.reference, parts.own_terms)
+    if forms is None:
         return None
+    law, reference = forms
     known = (*_outer.TRACE_KEYS, *parts.own_terms)
     places = {key: place for place, key in enumerate(known)}
     return _native.Drive(

@@ -231,7 +231,7 @@ class Session:
 
         With `feed`, zero set-points are sent at the outer rate meanwhile.
         """
-        rig = self._parts.rig
+        rig, link = self._parts.rig, self._parts.link
         period_s = 1.0 / self._scenario.control.rate_hz
         while waiting():
             now_s = rig.now_s()
@@ -239,7 +239,10 @@ class Session:
                 return False
             if feed:
                 self._send_wheels(0.0, 0.0)
-            self._intake.until(min(until_s, now_s + period_s))
+            if link.busy and not feed:
+                self._intake.periods(period_s, until_s)
+            else:
+                self._intake.until(min(until_s, now_s + period_s))
         return True
 
     def _check_safety(self, now_s: float) -> None:

@@ -14,9 +14,25 @@ std::string odd_stamp(double ahead_s) {
 
 Pump::Stop Pump::begin(double until_s, bool busy) {
   until_s_ = until_s;
+  last_s_ = -kInfinite;
   waited_ = false;
   stage_ = kLook;
   return run(busy);
+}
+
+Pump::Stop Pump::begin_periods(double period_s, double last_s) {
+  period_s_ = period_s;
+  last_s_ = last_s;
+  stage_ = kLook;
+  return next_period() ? run(true) : kReached;
+}
+
+bool Pump::next_period() {
+  const double now_s = rig_.now_s();
+  if (now_s >= last_s_) return false;
+  until_s_ = std::min(last_s_, now_s + period_s_);
+  waited_ = false;
+  return true;
 }
 
 Pump::Stop Pump::go_on(bool busy) { return run(busy); }
@@ -30,7 +46,7 @@ Pump::Stop Pump::run(bool busy) {
       reports_.clear();
       stage_ = kTake;
       take_bytes();
-      if (busy || !others.empty()) return kHeard;
+      if ((busy && link_.rested(now_s_)) || !others.empty()) return kHeard;
     }
     if (stage_ == kTake) {
       stage_ = kWait;
@@ -43,12 +59,14 @@ Pump::Stop Pump::run(bool busy) {
       if (!others.empty()) return kTaken;
     }
     stage_ = kLook;
-    if (now_s_ >= until_s_) break;
-    rig_.wait(until_s_);
-    waited_ = true;
+    if (now_s_ < until_s_) {
+      rig_.wait(until_s_);
+      waited_ = true;
+      continue;
+    }
+    if (!waited_) rig_.wait(now_s_);
+    if (!busy || !next_period()) return kReached;
   }
-  if (!waited_) rig_.wait(now_s_);
-  return kReached;
 }
 
 void Pump::take_bytes() {

@@ -27,9 +27,11 @@ class Pump {
       : rig_(rig), link_(link), camera_(camera), fused_(fused), watch_(watch), note_(std::move(note)) {}
 
   // Takes what arrives until until_s, and waits once at least. Stops on the way where messages wait in
-  // `others`, or after each arrival's bytes where a procedure is under way (`busy`): kHeard before, kTaken
-  // after reports and frames were taken.
+  // `others`, or after the bytes of an arrival that the procedure under way (`busy`) may look at, or whose
+  // time-out has come: kHeard before, kTaken after reports and frames were taken.
   Stop begin(double until_s, bool busy);
+  // The same period after period until last_s, for as long as the procedure under way is not done.
+  Stop begin_periods(double period_s, double last_s);
   Stop go_on(bool busy);
 
   double now_s() const { return now_s_; }
@@ -63,6 +65,7 @@ class Pump {
   enum Stage { kLook, kTake, kWait };
 
   Stop run(bool busy);
+  bool next_period();
   void take_bytes();
   void take_frame(const core::PoseFrame& frame);
 
@@ -74,6 +77,7 @@ class Pump {
   Note note_;
   Stage stage_ = kLook;
   double until_s_ = 0.0, now_s_ = 0.0;
+  double period_s_ = 0.0, last_s_ = -kInfinite;  // of begin_periods
   bool waited_ = false;
   std::int64_t restarts_ = 0;
   std::vector<wire::WheelReport> reports_;
