@@ -24,19 +24,25 @@ def plan_of(data):
 
 
 def judged_anew(data, workers=1):
-    """Return the data with the gains that ship judged anew; raises SystemExit with another yardstick."""
+    """Return the data with the laws judged anew whose gains are others than those that the data judge.
+
+    Raises SystemExit with another yardstick.
+    """
+    now = json.loads(json.dumps(shipped_gains(data["laws"])))
+    then = data.get("shipped_gains", {})
     plan = plan_of(data)
-    field = Field.of("suite", plan, data["laws"])
+    field = Field.of("suite", plan, [law for law in data["laws"] if then.get(law) != now[law]])
     with Pool(OnSuite(field.scenarios), workers) as pool:
 
         def make(jobs):
             return pool.map(jobs, lambda *_: None)
 
         yard = Yardstick.measured(field.tasks, make)
-        if any(dict(now) != data["yardstick"][task] for task, now in yard.figures.items()):
+        if any(dict(figures) != data["yardstick"][task] for task, figures in yard.figures.items()):
             raise SystemExit("the yardstick is another one by now: make the verdict anew")
-        found = shipped_scores(field, plan, yard, make)
-    return data | {"shipped": found, "shipped_gains": shipped_gains(field.laws)}
+        found = shipped_scores(field, plan, yard, make) if then != now else {}
+    rows = {law: found.get(law, data["shipped"].get(law)) for law in data["laws"]}
+    return data | {"shipped": rows, "shipped_gains": now}
 
 
 if __name__ == "__main__":

@@ -231,6 +231,7 @@ def test_judging_the_gains_that_ship_anew_gives_the_data_that_are_there():
     data = json.loads(shipped_text())
     one = dict.fromkeys(("search_cells", "unseen_cells", "ablation_cells"), 1)
     few = {**data, "laws": ["backstepping", "pid"], "plan": {**data["plan"], **one}}
+    few["shipped_gains"] = {}
     made = judged_anew(few)
     for law in few["laws"]:
         (cell,) = made["shipped"][law]
