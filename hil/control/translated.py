@@ -24,6 +24,7 @@ from hil.control import AsgIsm as AsgBlock
 from hil.control import _outer
 from hil.control.laws.asg_ism import AsgIsm
 from hil.control.laws.chain import Chain
+from hil.control.laws.guard import GuardedLaw
 from hil.control.laws.hold import HoldAtGoal
 from hil.control.laws.let_go import LetGo
 from hil.control.laws.state_feedback import StateFeedback
@@ -103,14 +104,23 @@ def _is_plain(made: object) -> bool:
     return not any(hasattr(kind, name) for name in vars(made))
 
 
+StandIn = Callable[[GuardedLaw], _outer.OuterLaw]
+
+
 def native_forms(
-    law: object, reference: object, own_terms: tuple[str, ...] = ()
+    law: object,
+    reference: object,
+    own_terms: tuple[str, ...] = (),
+    stand_in: StandIn | None = None,
 ) -> tuple[_outer.OuterLaw, _outer.Reference] | None:
-    """Return both for a run, as `native_law` and `native_reference` give them; None where one has none."""
+    """Return both for a run, as `native_law` and `native_reference` give them; None where one has none.
+
+    `stand_in` gives what stands for a law that can answer for several runs at once.
+    """
     if not (_as_translated() and _is_whole()) or len(own_terms) > _outer.OWN_TERMS_MOST:
         return None
     found = _reference(reference)
-    return None if found is None else (_law(law, own_terms), found)
+    return None if found is None else (_law(law, own_terms, stand_in), found)
 
 
 def native_law(law: object, own_terms: tuple[str, ...] = ()) -> _outer.OuterLaw | None:
@@ -124,13 +134,15 @@ def native_law(law: object, own_terms: tuple[str, ...] = ()) -> _outer.OuterLaw 
     return _law(law, own_terms)
 
 
-def _law(law: Any, own_terms: tuple[str, ...]) -> _outer.OuterLaw:
+def _law(law: Any, own_terms: tuple[str, ...], stand_in: StandIn | None = None) -> _outer.OuterLaw:
     kind = type(law)
     around = _AROUND.get(kind)
     if around is not None and _is_plain(law):
-        return around(_law(law._law, own_terms), law)
+        return around(_law(law._law, own_terms, stand_in), law)
     if is_translated(law):
         return _outer.law(kind.__name__, law._gains, law._limits, law._d0)
+    if stand_in is not None and kind is GuardedLaw and law.makes_batches:
+        return stand_in(law)
     return _outer.python_law(law, own_terms)
 
 

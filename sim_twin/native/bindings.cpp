@@ -18,6 +18,7 @@
 namespace nb = nanobind;
 using namespace nb::literals;
 
+void bind_lanes(nb::module_& m);   // lanes_bind.cpp
 void bind_render(nb::module_& m);  // render_bind.cpp
 void bind_rig(nb::module_& m);     // rig_bind.cpp
 
@@ -238,6 +239,7 @@ NB_MODULE(_native, m) {
   bind_names(m);
   bind_plant(m);
   bind_kernel(m);
+  bind_lanes(m);
   bind_render(m);
   bind_rig(m);
 }

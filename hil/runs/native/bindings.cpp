@@ -355,7 +355,8 @@ void bind_pump(nb::module_& m) {
 
 }  // namespace
 
-void bind_drive(nb::module_& m);  // drive_bind.cpp
+void bind_drive(nb::module_& m);     // drive_bind.cpp
+void bind_together(nb::module_& m);  // together_bind.cpp
 
 NB_MODULE(_native, m) {
   nb::set_leak_warnings(false);  // values held by a test session at exit are no leak
@@ -367,4 +368,5 @@ NB_MODULE(_native, m) {
   bind_watch(m);
   bind_pump(m);
   bind_drive(m);
+  bind_together(m);
 }

@@ -12,19 +12,19 @@ std::string odd_stamp(double ahead_s) {
   return "stamped earlier than a frame before it, or not at all";
 }
 
-Pump::Stop Pump::begin(double until_s, bool busy) {
+Pump::Stop Pump::begin(double until_s, bool busy, bool apart) {
   until_s_ = until_s;
   last_s_ = -kInfinite;
   waited_ = false;
   stage_ = kLook;
-  return run(busy);
+  return run(busy, apart);
 }
 
 Pump::Stop Pump::begin_periods(double period_s, double last_s) {
   period_s_ = period_s;
   last_s_ = last_s;
   stage_ = kLook;
-  return next_period() ? run(true) : kReached;
+  return next_period() ? run(true, false) : kReached;
 }
 
 bool Pump::next_period() {
@@ -35,9 +35,9 @@ bool Pump::next_period() {
   return true;
 }
 
-Pump::Stop Pump::go_on(bool busy) { return run(busy); }
+Pump::Stop Pump::go_on(bool busy, bool apart) { return run(busy, apart); }
 
-Pump::Stop Pump::run(bool busy) {
+Pump::Stop Pump::run(bool busy, bool apart) {
   while (true) {
     if (stage_ == kLook) {
       now_s_ = rig_.now_s();
@@ -58,13 +58,16 @@ Pump::Stop Pump::run(bool busy) {
       while (rig_.take_frame(frame)) take_frame(frame);
       if (!others.empty()) return kTaken;
     }
-    stage_ = kLook;
-    if (now_s_ < until_s_) {
-      rig_.wait(until_s_);
+    const bool over = now_s_ >= until_s_;
+    if (stage_ == kWait && !(over && waited_)) {
+      stage_ = over ? kOver : kLook;
       waited_ = true;
-      continue;
+      away_until_s_ = over ? now_s_ : until_s_;
+      if (apart) return kAway;
+      rig_.wait(away_until_s_);
     }
-    if (!waited_) rig_.wait(now_s_);
+    if (stage_ == kLook) continue;
+    stage_ = kLook;
     if (!busy || !next_period()) return kReached;
   }
 }

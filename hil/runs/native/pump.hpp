@@ -20,7 +20,7 @@ std::string odd_stamp(double ahead_s);
 
 class Pump {
  public:
-  enum Stop { kReached, kHeard, kTaken };
+  enum Stop { kReached, kHeard, kTaken, kAway };
 
   Pump(core::SimulatedRig& rig, wire::Link& link, core::CameraClock& camera, estimator::Fused& fused,
        Watch& watch, Note note)
@@ -28,11 +28,14 @@ class Pump {
 
   // Takes what arrives until until_s, and waits once at least. Stops on the way where messages wait in
   // `others`, or after the bytes of an arrival that the procedure under way (`busy`) may look at, or whose
-  // time-out has come: kHeard before, kTaken after reports and frames were taken.
-  Stop begin(double until_s, bool busy);
+  // time-out has come: kHeard before, kTaken after reports and frames were taken. `apart`: kAway instead of a
+  // wait, for who moves the rig on until away_until_s.
+  Stop begin(double until_s, bool busy, bool apart = false);
   // The same period after period until last_s, for as long as the procedure under way is not done.
   Stop begin_periods(double period_s, double last_s);
-  Stop go_on(bool busy);
+  Stop go_on(bool busy, bool apart = false);
+  core::SimulatedRig& rig() { return rig_; }
+  double away_until_s() const { return away_until_s_; }
 
   double now_s() const { return now_s_; }
   const wire::Link& link() const { return link_; }
@@ -62,9 +65,9 @@ class Pump {
   std::vector<FrameRow> frames;
 
  private:
-  enum Stage { kLook, kTake, kWait };
+  enum Stage { kLook, kTake, kWait, kOver };
 
-  Stop run(bool busy);
+  Stop run(bool busy, bool apart);
   bool next_period();
   void take_bytes();
   void take_frame(const core::PoseFrame& frame);
@@ -76,7 +79,7 @@ class Pump {
   Watch& watch_;
   Note note_;
   Stage stage_ = kLook;
-  double until_s_ = 0.0, now_s_ = 0.0;
+  double until_s_ = 0.0, now_s_ = 0.0, away_until_s_ = 0.0;
   double period_s_ = 0.0, last_s_ = -kInfinite;  // of begin_periods
   bool waited_ = false;
   std::int64_t restarts_ = 0;
