@@ -314,7 +314,7 @@ def case_scenario(case: Case, gains: Gains, task: Scenario | None = None) -> Sce
 
     `task` is what the case names, the built-in scenario when it is not given.
     """
-    scenario = task or _built_in(case.scenario)
+    scenario = task or _shipped(case.scenario)
     sets = scenario.control.gains.model_copy(update={"tuned": gains})
     control = scenario.control.model_copy(update={"gains": sets, "gain_set": "tuned"})
     changed: dict[str, object] = {"control": control}
@@ -329,14 +329,19 @@ def case_scenario(case: Case, gains: Gains, task: Scenario | None = None) -> Sce
 
 
 @cache
-def _built_in(name: str) -> Scenario:
-    """Return a built-in scenario, read once: reading it takes a sixth of the time of a run."""
+def _shipped(name: str) -> Scenario:
+    """Return a built-in scenario: a search asks for it in each of its runs."""
     return load_scenario(name)
+
+
+@cache
+def _pushed_robot() -> RobotConfig:
+    return load_robot(PUSHED_ROBOT)
 
 
 def _pushes(robot: RobotConfig) -> tuple[Disturbance, ...]:
     """Return PUSHES for a robot of another size: force by its weight, twist by weight and track."""
-    usual = load_robot(PUSHED_ROBOT)
+    usual = _pushed_robot()
     weight = robot.mass_kg / usual.mass_kg
     ratios = (weight, weight * robot.track_m / usual.track_m)
     return tuple(

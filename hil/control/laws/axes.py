@@ -57,13 +57,13 @@ class TurnedAxes:
     def _estimate(self, estimate: Estimate) -> Estimate:
         pose, z3 = estimate.pose, estimate.z3_m_s2
         x, y = self._into((pose.x_m, pose.y_m))
-        return replace(
+        turned = replace(
             estimate,
             pose=Pose(x, y, pose.theta_rad - self._angle_rad),
             z1_m=self._into(estimate.z1_m),
             z2_m_s=self._into(estimate.z2_m_s),
-            z3_m_s2=None if z3 is None else self._into(z3),
         )
+        return turned if z3 is None else replace(turned, z3_m_s2=self._into(z3))
 
     def _back(self, trace: Mapping[str, float]) -> dict[str, float]:
         """Return the trace with each pair of terms NAME_x..., NAME_y... in the axes of the world."""
