@@ -394,7 +394,7 @@ def project(view: View, x: float, y: float, z: float) -> list[float]:
     """Return the pixel (u, v) of a world point; raises ValueError behind the camera."""
 
 class DrawnRig:
-    """The rig with drawn poses for a camera, as native code of the host drives it."""
+    """The rig with drawn poses or pictures for a camera, as native code of the host drives it."""
 
     def __init__(
         self,
@@ -405,7 +405,10 @@ class DrawnRig:
         sigma_xy_m: float,
         sigma_theta_rad: float,
         true_d0_m: float,
-    ) -> None: ...
+        poses: int,
+    ) -> None:
+        """`poses` are those that a picture takes along; with 0 of them frames bring drawn poses."""
+
     def set_faults(
         self, repeats: Sequence[_Span], stamp_steps: Sequence[tuple[float, _Span]]
     ) -> None:
@@ -413,6 +416,12 @@ class DrawnRig:
 
     def take_frame(self) -> tuple[int, float, tuple[float, float, float] | None, str] | None:
         """Return number, stamp, pose (None where the robot was not seen) and why not."""
+
+    def shown(self) -> tuple[int, float, tuple[tuple[float, float, float], ...]] | None:
+        """Return number, begin and poses of what the picture of the frame taken last shows.
+
+        Of one that repeats the frame before it is that one's; None before the first, or without pictures.
+        """
 
     def handle(self) -> object:
         """Return what native code takes; it lives as long as this."""

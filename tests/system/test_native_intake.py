@@ -180,9 +180,9 @@ def test_all_ways_give_the_same_run_under_each_fault(fault):
 def test_the_comparison_sees_a_changed_constant():
     """With a microsecond more of camera latency on one way alone the runs differ (negative control)."""
 
-    def make_pump(parts, watch, note):
+    def make_pump(parts, watch, note, camera):
         latency_s = spec_of(ONE).scenario.camera.latency_s + 1e-6
-        return REAL(replace(parts, camera_clock=CameraClock(latency_s)), watch, note)
+        return REAL(replace(parts, camera_clock=CameraClock(latency_s)), watch, note, camera)
 
     changed = differences(run(ONE, make_pump, REAL_DRIVE), in_python(ONE))
     assert {"samples.est_x_m", "frames.t_exposure_s", "figures"} <= set(changed)
