@@ -26,6 +26,20 @@ Dense<M, N> product(const Dense<M, K>& a, const Dense<K, N>& b) {
   return out;
 }
 
+// A matrix applied to a column of two or three: the second term is the first.
+template <std::size_t M, std::size_t N>
+std::array<double, M> applied(const Dense<M, N>& a, const std::array<double, N>& x) {
+  static_assert(N == 2 || N == 3, "longer sums have another order");
+  std::array<double, M> out;
+  for (std::size_t i = 0; i < M; ++i) {
+    out[i] = std::fma(a[i][0], x[0], a[i][1] * x[1]);
+    if constexpr (N == 3) {
+      out[i] = std::fma(a[i][2], x[2], out[i]);
+    }
+  }
+  return out;
+}
+
 template <std::size_t M, std::size_t N>
 Dense<N, M> transposed(const Dense<M, N>& a) {
   Dense<N, M> out;

@@ -27,8 +27,8 @@ Rigid unweighted(const std::array<Vec2, 2>& body, const std::array<Spot, 2>& spo
   const double theta_rad = std::atan2(across, along);
   const double c = std::cos(theta_rad);
   const double s = std::sin(theta_rad);
-  const Dense<2, 1> turned = product(Dense<2, 2>{{{c, -s}, {s, c}}}, Dense<2, 1>{{{b0.x}, {b0.y}}});
-  return {w0.x - turned[0][0], w0.y - turned[1][0], theta_rad};
+  const std::array<double, 2> turned = applied(Dense<2, 2>{{{c, -s}, {s, c}}}, {b0.x, b0.y});
+  return {w0.x - turned[0], w0.y - turned[1], theta_rad};
 }
 
 }  // namespace
@@ -56,39 +56,39 @@ Placed weighted_pose(const std::array<Vec2, 2>& body_m, const std::array<Spot, 2
   const std::array<Dense<2, 2>, 2> weight = {inverse_of(spots[0].spread_m2), inverse_of(spots[1].spread_m2)};
   auto [x_m, y_m, theta_rad] = unweighted(body_m, spots);
   Placed found{};
-  std::array<Dense<2, 1>, 2> rest;
+  std::array<std::array<double, 2>, 2> rest;
   for (int step = 0;; ++step) {
     const double c = std::cos(theta_rad);
     const double s = std::sin(theta_rad);
-    std::array<Dense<3, 2>, 2> turned;
     Dense<3, 3> information{};
-    Dense<3, 1> pull{};
+    std::array<double, 3> pull{};
     for (int k = 0; k < 2; ++k) {
       const Dense<1, 2> body = {{{body_m[k].x, body_m[k].y}}};
       const auto [arm] = product(body, Dense<2, 2>{{{c, s}, {-s, c}}});
-      rest[k] = {{{spots[k].at_m.x - arm[0] - x_m}, {spots[k].at_m.y - arm[1] - y_m}}};
+      rest[k] = {spots[k].at_m.x - arm[0] - x_m, spots[k].at_m.y - arm[1] - y_m};
       const Dense<2, 3> slopes = {{{1.0, 0.0, -arm[1]}, {0.0, 1.0, arm[0]}}};
-      turned[k] = product(transposed(slopes), weight[k]);
-      const Dense<3, 3> own = product(turned[k], slopes);
-      const Dense<3, 1> force = product(turned[k], rest[k]);
+      const Dense<3, 2> turned = product(transposed(slopes), weight[k]);
+      const Dense<3, 3> own = product(turned, slopes);
+      const std::array<double, 3> force = applied(turned, rest[k]);
       for (int i = 0; i < 3; ++i) {
         for (int j = 0; j < 3; ++j) {
           information[i][j] += own[i][j];
         }
-        pull[i][0] += force[i][0];
+        pull[i] += force[i];
       }
     }
     if (step == kSteps) {
       break;
     }
     found.covariance = inverse_of(information);
-    const Dense<3, 1> move = product(found.covariance, pull);
-    x_m += move[0][0];
-    y_m += move[1][0];
-    theta_rad += move[2][0];
+    const std::array<double, 3> move = applied(found.covariance, pull);
+    x_m += move[0];
+    y_m += move[1];
+    theta_rad += move[2];
   }
   for (int k = 0; k < 2; ++k) {
-    found.left += product(product(transposed(rest[k]), weight[k]), rest[k])[0][0];
+    const Dense<1, 2> row = {{rest[k]}};
+    found.left += product(product(row, weight[k]), transposed(row))[0][0];
   }
   found.x_m = x_m;
   found.y_m = y_m;
