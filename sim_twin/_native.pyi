@@ -34,6 +34,17 @@ class PlantParams:
     def __setattr__(self, name: str, value: float, /) -> None: ...
     def __getattr__(self, name: str, /) -> float: ...
 
+CHAINS: tuple[str, ...]
+
+def chained(chain: int, operations: int) -> float:
+    """Do operations of a kind of CHAINS, each of which waits for the result of the one before."""
+
+def widest_register() -> int:
+    """Return how many doubles a register of this processor holds at most: 2, 4 or 8."""
+
+def side_by_side(width: int, operations: int) -> int:
+    """Do at least so many independent sums and products, `width` a register; return how many, 0 for none."""
+
 class Plant:
     """The robot alone: bridge duty in, motion out."""
 

@@ -83,7 +83,9 @@ def make_pump(
     if rig is None or not two_sided:
         return None
     eye = _eye(parts, camera)
-    return _native.Pump(rig, parts.link.native, parts.camera_clock, parts.estimator, watch, note, eye)
+    return _native.Pump(
+        rig, parts.link.native, parts.camera_clock, parts.estimator, watch, note, eye
+    )
 
 
 def _eye(parts: Parts, camera: CameraConfig) -> Callable[[PoseTuple | None], tuple[Any, ...]]:

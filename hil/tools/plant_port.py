@@ -121,7 +121,11 @@ OF_FLOATS = Functions(math.sqrt, abs, _not_below_0, math.cos, math.sin)
 OF_ARRAYS = Functions(np.sqrt, np.abs, lambda v: np.maximum(v, 0.0), np.cos, np.sin)
 
 
-def make_step(f: Functions, made: Callable[[Any], Any] = lambda function: function) -> Step:
+def _as_it_is(function: Any) -> Any:
+    return function
+
+
+def make_step(f: Functions, made: Callable[[Any], Any] = _as_it_is) -> Step:  # noqa: PLR0915 - closures
     """Return step(state, p, h_s, duty_left, duty_right): one step of Runge and Kutta, order 4.
 
     `state` is in the order of `_native.STATES`. Each function goes through `made` (numba's compiler).
@@ -154,9 +158,7 @@ def make_step(f: Functions, made: Callable[[Any], Any] = lambda function: functi
         """Return the state's rate, at a heading of cosine c and sine s."""
         _, _, _, eta1, eta2, turn, left_a, right_a, _, _, left_w, right_w, charge = x
         drawn_a = p.idle_a + p.motors * (duty_left * left_a + duty_right * right_a)
-        supply_v = not_below_0(
-            p.empty_v + p.span_v * charge - p.battery_resistance_ohm * drawn_a
-        )
+        supply_v = not_below_0(p.empty_v + p.span_v * charge - p.battery_resistance_ohm * drawn_a)
         left_rate, left_n_m, left_sign = motor(p, left_a, left_w, duty_left, supply_v)
         right_rate, right_n_m, right_sign = motor(p, right_a, right_w, duty_right, supply_v)
         left_n = left_n_m * p.per_radius - p.roll_n * left_sign
@@ -204,7 +206,9 @@ def make_step(f: Functions, made: Callable[[Any], Any] = lambda function: functi
         d2 = by * by
         less = d2 * (0.5 - d2 * (1.0 / 24.0 - d2 * (1.0 / 720.0)))
         sine = by * (1.0 - d2 * (1.0 / 6.0 - d2 * (1.0 / 120.0)))
-        return slope(x, p, c - (c * less + s * sine), s - (s * less - c * sine), duties[0], duties[1])
+        return slope(
+            x, p, c - (c * less + s * sine), s - (s * less - c * sine), duties[0], duties[1]
+        )
 
     turned = made(turned)
 
@@ -256,7 +260,9 @@ class Counted:
     waiting, in any unit.
     """
 
-    def __init__(self, value: float, at: float, counts: Counter[str], takes: dict[str, float]) -> None:
+    def __init__(
+        self, value: float, at: float, counts: Counter[str], takes: dict[str, float]
+    ) -> None:
         self.value, self.at = value, at
         self._counts, self._takes = counts, takes
 

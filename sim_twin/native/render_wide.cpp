@@ -24,8 +24,8 @@ struct Lines {
 
 // Ids of `count` places on the plate: of what lies on it the last one counts.
 template <int N>
-CAMERA_INLINE void on_plate(const Patch* patches, size_t patch_count, const float (&x)[N], const float (&y)[N],
-                            int count, int (&ids)[N]) {
+CAMERA_INLINE void on_plate(const Patch* patches, size_t patch_count, const float (&x)[N],
+                            const float (&y)[N], int count, int (&ids)[N]) {
   for (size_t k = 0; k < patch_count; ++k) {
     const Patch p = patches[k];
     const int id = ID_PATCH + static_cast<int>(k);
@@ -98,7 +98,8 @@ CAMERA_INLINE void samples_of(const Outline& robot, const SightPatch& patch, con
   for (int i = 0; i < N; ++i) out[i] = static_cast<uint8_t>(ids[i]);
 }
 
-CAMERA_WIDE void chunk_of(const Outline& robot, const Pose& pose, const Sight* sights, int count, uint8_t* out) {
+CAMERA_WIDE void chunk_of(const Outline& robot, const Pose& pose, const Sight* sights, int count,
+                          uint8_t* out) {
   Lines<CHUNK> at;
   int ids[CHUNK];
   const Pose p = pose;
@@ -128,15 +129,16 @@ CAMERA_WIDE void first_samples(const Outline& robot, const SightPatch& patch, co
 Outline::Outline(const Robot& robot)
     : top(robot.top), half_length(robot.half_length), half_width(robot.half_width),
       reach_x(std::max(robot.half_length, std::fabs(robot.axle_x) + robot.half_base + robot.wheel_radius)),
-      reach_y(std::max(robot.half_width, robot.half_track + robot.wheel_half_width)), patches(robot.patches) {}
+      reach_y(std::max(robot.half_width, robot.half_track + robot.wheel_half_width)), patches(robot.patches) {
+}
 
 void meet_row(const Outline& robot, const Pose& pose, const Sight* sights, int count, uint8_t* ids) {
   for (int first = 0; first < count; first += CHUNK)
     chunk_of(robot, pose, sights + first, std::min(CHUNK, count - first), ids + first);
 }
 
-void meet_samples(const Outline& robot, const SightPatch& patch, const Samples& samples, int count, bool in_plane,
-                  uint8_t* ids) {
+void meet_samples(const Outline& robot, const SightPatch& patch, const Samples& samples, int count,
+                  bool in_plane, uint8_t* ids) {
   if (count > 8) {
     all_samples(robot, patch, samples, in_plane, ids);
   } else {

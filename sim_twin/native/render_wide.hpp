@@ -23,7 +23,7 @@ void meet_row(const Outline& robot, const Pose& pose, const Sight* sights, int c
 
 // Ids that the first `count` samples of a pixel meet (4, 8 or 24 of them); `in_plane` where nothing but the plate can
 // be met.
-void meet_samples(const Outline& robot, const SightPatch& patch, const Samples& samples, int count, bool in_plane,
-                  uint8_t* ids);
+void meet_samples(const Outline& robot, const SightPatch& patch, const Samples& samples, int count,
+                  bool in_plane, uint8_t* ids);
 
 }  // namespace camera

@@ -172,7 +172,8 @@ void bind_rig(nb::module_& m) {
           "__init__",
           [](DrawnRig* self, Rig& rig, twin::DrawnPoses& drawn, core::LineBacklog& backlog, double quality,
              double sigma_xy_m, double sigma_theta_rad, double true_d0_m, int poses) {
-            new (self) DrawnRig(rig, drawn, {quality, sigma_xy_m, sigma_theta_rad, true_d0_m}, backlog, poses);
+            new (self)
+                DrawnRig(rig, drawn, {quality, sigma_xy_m, sigma_theta_rad, true_d0_m}, backlog, poses);
           },
           nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(), "rig"_a, "drawn"_a,
           "backlog"_a, "quality"_a, "sigma_xy_m"_a, "sigma_theta_rad"_a, "true_d0_m"_a, "poses"_a)

@@ -26,8 +26,9 @@ Camera::Radial Camera::fisheye_radial(double r2) const {
 
 Camera::Radial Camera::bend(double r2) const {
   const auto& [k1, k2, p1, p2, k3] = distortion;
-  return fisheye ? fisheye_radial(r2)
-                 : Radial{1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)), 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))};
+  return fisheye
+             ? fisheye_radial(r2)
+             : Radial{1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)), 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))};
 }
 
 std::array<double, 3> Camera::distort_slope(Vec2 at) const {
