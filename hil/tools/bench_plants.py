@@ -2,7 +2,7 @@
 
 Beside it stand the same equations in numpy (many runs side by side) and in numba's machine code, and a robot
 of four wheels in MuJoCo, which has contacts and no motors. Each is processor time of one core a step. The
-limits are worked out from the operations of a step, counted, and from what this core does with them, measured.
+limits come from the operations of a step, counted, and from what this core does with them, measured.
 """
 
 from __future__ import annotations
