@@ -173,6 +173,18 @@ class Kernel:
 
 _Span = tuple[float, float]
 
+def lane_widths() -> list[int]:
+    """Return how many robots this processor can move side by side, 1 (one by one) first."""
+
+def advance_together(
+    kernels: Sequence[Kernel], t_us: Sequence[int], lanes: int = 0
+) -> list[tuple[int | str, int]]:
+    """Do `Kernel.advance` of each, side by side; the same bits for every number of `lanes` (0: the widest).
+
+    Returns for each the time reached, or the text of what `advance` raises, and how many of its steps were
+    taken in a lane. No kernel may be there twice. Raises ValueError where the processor lacks the width.
+    """
+
 class Serialiser:
     """A UART that sends one byte after the other, `byte_s` each."""
 
@@ -227,7 +239,6 @@ class DrawnPoses:
         error: Sequence[float],
         swapped: bool,
         shift_m: float,
-        places: Sequence[Sequence[tuple[float, float, float, float]]],
         chance: Sequence[int],
     ) -> None: ...
     def measure(

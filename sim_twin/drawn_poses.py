@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import cache
 from importlib.resources import files
 from random import Random
@@ -42,31 +41,11 @@ def load_localiser_error() -> LocaliserError:
     return LocaliserError.model_validate(parse_toml(text, "localiser_error.toml"))
 
 
-# A bias that stands with the place: waves over the floor and the heading, so short that places a few
-# pixels apart have each their own, so long that a robot at rest keeps its.
-_WAVES = 12
-_WAVE_LENGTHS_M = (0.01, 0.05)
-_WAVES_PER_TURN = 12
-
-
-def _place_bias(rng: Random) -> list[tuple[float, float, float, float]]:
-    """Draw one number of mean 0 and deviation 1 over all poses, the same whenever the robot is there."""
-    return [_wave(rng) for _ in range(_WAVES)]
-
-
-def _wave(rng: Random) -> tuple[float, float, float, float]:
-    number = 2.0 * math.pi / rng.uniform(*_WAVE_LENGTHS_M)
-    way = rng.uniform(-math.pi, math.pi)
-    turns = rng.randint(-_WAVES_PER_TURN, _WAVES_PER_TURN)
-    phase = rng.uniform(-math.pi, math.pi)
-    return number * math.cos(way), number * math.sin(way), float(turns), phase
-
-
 class DrawnPoses:
     """Draws one measurement per frame; the same for the same rng and poses (native/eye.hpp).
 
     `place_ratio` of the variance stands as long as the robot does (where the marks lie on the
-    pixels); the rest is new with each frame.
+    pixels): waves over floor and heading that are drawn first. The rest is new with each frame.
     """
 
     def __init__(self, error: LocaliserError, camera: CameraConfig, rng: Random) -> None:
@@ -81,7 +60,6 @@ class DrawnPoses:
             # the robot turned round, displaced by the marks' offset from the centre of mass.
             swapped=marks.swapped_marks,
             shift_m=marks.front.x_m + marks.rear.x_m,
-            places=[_place_bias(rng) for _ in range(3)],  # of X, Y and theta
             chance=state_of(rng),
         )
 

@@ -8,6 +8,7 @@ from random import Random
 from typing import TYPE_CHECKING
 
 from hil.control.vehicles.vehicle import make_vehicle
+from hil.core.newest import of_newest
 from sim_twin import _native
 
 if TYPE_CHECKING:
@@ -38,6 +39,9 @@ def plant_params(robot: RobotConfig) -> _native.PlantParams:
     return params
 
 
+_plant_params = of_newest(plant_params)
+
+
 def make_kernel(
     robot: RobotConfig,
     baud: int,
@@ -61,7 +65,7 @@ def make_kernel(
             robot.board_clock_ppm, clock_start_us, float(baud), wired, eeprom
         )
     kernel = _native.Kernel(
-        plant_params(robot),
+        _plant_params(robot),
         step_us=STEP_US,
         counts_per_turn=robot.encoder_counts_per_turn,
         board=board,

@@ -62,6 +62,9 @@ def pieces(columns: Columns, names: Sequence[str], before: int = 0) -> Iterator[
 
 def _pieces(columns: Columns, names: Sequence[str]) -> Iterator[dict[str, Array]]:
     stored = _on_disk(columns)
+    if stored is None and len(columns[names[0]]) <= PIECE_ROWS:
+        yield {name: columns[name] for name in names}
+        return
     tables = stored.groups(names) if stored is not None else iter((columns,))
     for table in tables:
         some = {name: table[name] for name in names}
@@ -78,12 +81,11 @@ def percentiles(parts: Callable[[], Iterator[Array]], percents: Sequence[float])
     total, held = _held(values[np.isfinite(values)] for values in parts())
     if total == 0:
         return [math.nan] * len(percents)
-    if total <= PIECE_ROWS:
-        return [float(value) for value in np.percentile(np.concatenate(held), percents)]
     places = [(total - 1) * (percent / 100.0) for percent in percents]
     low = [min(math.floor(place), total - 1) for place in places]
     wanted = sorted({rank for first in low for rank in (first, min(first + 1, total - 1))})
-    ranked = dict(zip(wanted, _of_ranks(parts, wanted), strict=True))
+    found = _ranked(held, wanted) if total <= PIECE_ROWS else _of_ranks(parts, wanted)
+    ranked = dict(zip(wanted, found, strict=True))
     return [
         _between(ranked[first], ranked[min(first + 1, total - 1)], place - first)
         for place, first in zip(places, low, strict=True)
@@ -98,7 +100,18 @@ def median(parts: Callable[[], Iterator[Array]]) -> float:
     total, held = _held(parts())
     if total > PIECE_ROWS:
         return percentiles(parts, [50])[0]
-    return float(np.median(np.concatenate(held))) if total else math.nan
+    if not total or any(np.isnan(values).any() for values in held):
+        return math.nan
+    half, odd = divmod(total, 2)
+    middle = _ranked(held, [half] if odd else [half - 1, half])
+    return sum(middle) / len(middle)
+
+
+def _ranked(held: Sequence[Array], ranks: Sequence[int]) -> list[float]:
+    """Return the values at these places of the sorted whole."""
+    values = held[0] if len(held) == 1 else np.concatenate(held)
+    found: list[float] = np.partition(values, ranks)[ranks].tolist()
+    return found
 
 
 def _held(parts: Iterable[Array]) -> tuple[int, list[Array]]:

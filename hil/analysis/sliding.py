@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hil.analysis.pieces import median, percentiles, pieces, row_count
+from hil.analysis.pieces import PIECE_ROWS, median, percentiles, pieces, row_count
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -64,7 +64,9 @@ class LawFacts:
 
 def law_ran(columns: Columns) -> NDArray[np.bool_]:
     """Return at which ticks the law ran: all but those in which the control stop commands rest."""
-    resting: NDArray[np.bool_] = np.all([columns[name] == 0.0 for name in RESTING], axis=0)
+    resting: NDArray[np.bool_] = columns[RESTING[0]] == 0.0
+    for name in RESTING[1:]:
+        resting &= columns[name] == 0.0
     return ~resting
 
 
@@ -178,8 +180,11 @@ def _share(columns: Columns, facts: LawFacts) -> float:
     own = ["slide_x_m_s3", "slide_y_m_s3"] if "slide_x_m_s3" in columns else []
     names = [*_OF_SHARE, *own, *RESTING]
 
+    short = row_count(columns) <= PIECE_ROWS  # a long run's are worked out anew each time
+    kept = [_shares(piece, facts) for piece in pieces(columns, names)] if short else None
+
     def parts() -> Iterator[tuple[Array, Array]]:
-        return (_shares(piece, facts) for piece in pieces(columns, names))
+        return iter(kept or (_shares(piece, facts) for piece in pieces(columns, names)))
 
     if not any(np.isfinite(both).any() for _, both in parts()):
         return math.nan

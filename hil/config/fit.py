@@ -11,6 +11,7 @@ from hil.board.wheel_laws import WHEEL_LAWS
 from hil.config.limits import board_defaults, board_table
 from hil.config.mismatch import true_robot
 from hil.core.errors import BadInput
+from hil.core.newest import of_newest
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 _PERIOD_SHARE = 0.8
 
 
+@of_newest
 def check_fit(scenario: Scenario) -> None:
     """Raise BadInput where values that are allowed one by one cannot work together."""
     board = board_defaults() | scenario.board

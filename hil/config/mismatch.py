@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 from hil.config.load import build
 from hil.config.robot import RobotConfig
 from hil.core.errors import BadInput
+from hil.core.newest import of_newest
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
 
 
+@of_newest
 def true_robot(scenario: Scenario) -> RobotConfig:
     """Return the robot as it really is: the believed one with the scenario's mismatch applied.
 

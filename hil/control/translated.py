@@ -15,6 +15,7 @@ import math
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module
+from operator import itemgetter
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -23,6 +24,7 @@ from hil.control import AsgIsm as AsgBlock
 from hil.control import _outer
 from hil.control.laws.asg_ism import AsgIsm
 from hil.control.laws.chain import Chain
+from hil.control.laws.guard import GuardedLaw
 from hil.control.laws.hold import HoldAtGoal
 from hil.control.laws.let_go import LetGo
 from hil.control.laws.state_feedback import StateFeedback
@@ -58,7 +60,12 @@ def _taken(owner: Any) -> dict[str, Any]:
     }
 
 
-_PARTS = [(owner, [*taken], [*taken.values()]) for owner in _owners() if (taken := _taken(owner))]
+# What an owner has, how its parts are read from that (two at least: a tuple), and what they were.
+_PARTS = [
+    (vars(owner), itemgetter(*taken, "__doc__"), (*taken.values(), owner.__doc__))
+    for owner in _owners()
+    if (taken := _taken(owner))
+]
 _FUNCTIONS = [v for _, _, values in _PARTS for v in values if isinstance(v, FunctionType)]
 _CODES = [function.__code__ for function in _FUNCTIONS]
 
@@ -84,7 +91,10 @@ def _pairs() -> list[tuple[float, float]]:
 
 def _is_whole() -> bool:
     """Say whether nobody has replaced a function or a number since."""
-    parts = all([*map(vars(owner).get, names)] == values for owner, names, values in _PARTS)
+    try:
+        parts = all(read(owned) == values for owned, read, values in _PARTS)
+    except KeyError:  # one is gone
+        return False
     return parts and [function.__code__ for function in _FUNCTIONS] == _CODES
 
 
@@ -92,6 +102,25 @@ def _is_plain(made: object) -> bool:
     """Say whether an object hides nothing of its class."""
     kind = type(made)
     return not any(hasattr(kind, name) for name in vars(made))
+
+
+StandIn = Callable[[GuardedLaw], _outer.OuterLaw]
+
+
+def native_forms(
+    law: object,
+    reference: object,
+    own_terms: tuple[str, ...] = (),
+    stand_in: StandIn | None = None,
+) -> tuple[_outer.OuterLaw, _outer.Reference] | None:
+    """Return both for a run, as `native_law` and `native_reference` give them; None where one has none.
+
+    `stand_in` gives what stands for a law that can answer for several runs at once.
+    """
+    if not (_as_translated() and _is_whole()) or len(own_terms) > _outer.OWN_TERMS_MOST:
+        return None
+    found = _reference(reference)
+    return None if found is None else (_law(law, own_terms, stand_in), found)
 
 
 def native_law(law: object, own_terms: tuple[str, ...] = ()) -> _outer.OuterLaw | None:
@@ -105,13 +134,15 @@ def native_law(law: object, own_terms: tuple[str, ...] = ()) -> _outer.OuterLaw 
     return _law(law, own_terms)
 
 
-def _law(law: Any, own_terms: tuple[str, ...]) -> _outer.OuterLaw:
+def _law(law: Any, own_terms: tuple[str, ...], stand_in: StandIn | None = None) -> _outer.OuterLaw:
     kind = type(law)
     around = _AROUND.get(kind)
     if around is not None and _is_plain(law):
-        return around(_law(law._law, own_terms), law)
+        return around(_law(law._law, own_terms, stand_in), law)
     if is_translated(law):
         return _outer.law(kind.__name__, law._gains, law._limits, law._d0)
+    if stand_in is not None and kind is GuardedLaw and law.makes_batches:
+        return stand_in(law)
     return _outer.python_law(law, own_terms)
 
 
@@ -143,8 +174,12 @@ _REFERENCES = {Point, Circle, Waypoints, Stops}
 
 def native_reference(reference: Any) -> _outer.Reference | None:
     """Return the native reference that is the same motion; None where there is none."""
+    return _reference(reference) if _as_translated() and _is_whole() else None
+
+
+def _reference(reference: Any) -> _outer.Reference | None:
     kind = type(reference)
-    if kind not in _REFERENCES or not (_as_translated() and _is_whole() and _is_plain(reference)):
+    if kind not in _REFERENCES or not _is_plain(reference):
         return None
     if kind is Point:
         return _outer.point(reference._state)

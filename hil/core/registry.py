@@ -326,6 +326,8 @@ def declared_terms(entry: Entry) -> Terms:
 
 def is_file_name(name: str) -> bool:
     """Say whether a name means a file: `x.py`, `x.py:Name`, or anything with a folder in it."""
+    if not (".py" in name or "/" in name or "\\" in name):  # the short way: runs ask for names
+        return False
     path, _, _ = _split_file_name(name)
     return path.endswith(".py") or "/" in path or "\\" in path
 

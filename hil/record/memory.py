@@ -74,7 +74,7 @@ class Rows:
     def columns(self, names: Sequence[str]) -> Columns:
         """Return the table by column."""
         table = np.frombuffer(self._values, np.float64).reshape(len(self), self._width)
-        return {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(names)}
+        return dict(zip(names, table.T.copy(), strict=True))
 
 
 @dataclass(slots=True)

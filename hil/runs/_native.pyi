@@ -1,6 +1,7 @@
 """What a session does between two ticks; times are host times in s, world frame, SI."""
 
 from collections.abc import Callable, Sequence
+from typing import NoReturn
 
 from hil.control._outer import OuterLaw, Reference
 from hil.control.estimators._fused import Fused
@@ -144,6 +145,7 @@ class Pump:
         eye: _Eye,
     ) -> None: ...
     def begin(self, until_s: float, busy: bool) -> int: ...
+    def begin_periods(self, period_s: float, last_s: float) -> int: ...
     def go_on(self, busy: bool) -> int: ...
     def others(self) -> list[tuple[int, bytes]]: ...
     def frame_rows(self, origin_s: float) -> bytes:
@@ -194,6 +196,38 @@ class Drive:
     def take_rows(self) -> bytes:
         """Return the rows of ticks since the last call, in doubles."""
 
+class AnsweredLaw(OuterLaw):
+    """A law that native code asks and others answer; see native/answered_law.hpp."""
+
+    is_reset: bool
+    def __init__(self) -> None: ...
+
+def questions(laws: Sequence[AnsweredLaw]) -> bytes:
+    """Return what laws are asked: rows of doubles in the order of hil.core.batch.asked, a column a law."""
+
+def answer(laws: Sequence[AnsweredLaw], answers: bytes, places: Sequence[int]) -> None:
+    """Answer: forward speeds, turn rates, then what goes to the places of the traces; a column a law."""
+
+class Together:
+    """The controlled parts of several runs, advanced side by side; see native/together.hpp."""
+
+    waiting: list[int]  # whose laws are to be answered before anything else goes on
+    def __init__(self) -> None: ...
+    def add(self, drive: Drive) -> int:
+        """Take a run in; it begins with `go_on`. Returns its place."""
+
+    def go_on(
+        self, place: int, busy: bool, refused: bool, board: tuple[int, float, float]
+    ) -> None: ...
+    def answered(self, place: int) -> None: ...
+    def end(self, place: int) -> None: ...
+    def run(self) -> list[tuple[int, int]]:
+        """Advance until somebody is needed: which runs have stopped, and why (as `Drive.run`, or FAILED)."""
+
+    def rethrow(self, place: int) -> NoReturn:
+        """Raise what ended the run."""
+
+FAILED: int
 DONE: int
 DRIVE_HEARD: int
 DRIVE_TAKEN: int

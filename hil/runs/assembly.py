@@ -15,6 +15,7 @@ from hil.control.references import make_reference
 from hil.control.vehicles.vehicle import make_vehicle
 from hil.core.clocks import CameraClock
 from hil.core.registries import OUTER_LAWS
+from hil.record.memory import MemoryRecorder, RunSink
 from hil.record.timeline import Timeline
 from hil.runs.parts import Parts
 from hil.wire.link import BoardLink
@@ -23,7 +24,6 @@ from vision.localisers.making import localiser_of_frames
 if TYPE_CHECKING:
     from hil.core.rig import Rig
     from hil.core.types import OuterLaw
-    from hil.record.memory import RunSink
     from hil.runs.spec import RunSpec
 
 
@@ -37,7 +37,7 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw) -> Par
     timeline = Timeline(recorder, _unix_us)
     return Parts(
         rig=rig,
-        link=BoardLink(rig.stream, timeline.link_frame),
+        link=BoardLink(rig.stream, timeline.link_frame if _keeps_link(recorder) else None),
         camera_clock=CameraClock(scenario.camera.latency_s),
         localiser=localiser_of_frames(
             scenario.camera, drawn=spec.camera == "pose" and spec.is_simulated
@@ -50,6 +50,10 @@ def make_parts(spec: RunSpec, rig: Rig, recorder: RunSink, law: OuterLaw) -> Par
         timeline=timeline,
         own_terms=tuple(OUTER_LAWS.get(spec.outer).trace),
     )
+
+
+def _keeps_link(recorder: RunSink) -> bool:
+    return type(recorder) is not MemoryRecorder or recorder.keep_link
 
 
 def _unix_us() -> int:

@@ -3,26 +3,50 @@
 The ticks are native/drive.hpp; it comes back for what only Python knows: procedures, texts of the board,
 what ends a run, and the step of a law that is not translated. Where something is looked at or changed on the
 way (a caller that steps, a watcher, an operator, a reference of somebody's own), the session goes tick by
-tick instead: the same run.
+tick instead: the same run. Of several runs the native parts may advance side by side (hil/runs/together.py).
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 from hil.control import _outer
 from hil.control.estimators.geometry import BelievedGeometry
-from hil.control.translated import native_law, native_reference
+from hil.control.translated import native_forms
 from hil.record.memory import MemoryRecorder
 from hil.record.schema import TRACE_KEYS
 from hil.runs import _native
 from hil.runs.parts import NoOrders
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Generator
 
+    from hil.control.laws.guard import GuardedLaw
     from hil.runs.intake import Intake
     from hil.runs.parts import Parts
+
+
+class Asked(NamedTuple):
+    """A law that is answered for several runs at once: what native code asks, the run's own law."""
+
+    native: _native.AnsweredLaw
+    law: GuardedLaw
+    own_terms: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """A run whose ticks others advance: what they do it by, with what `Drive.run` is given.
+
+    `asked` is its law, where that is answered for several runs at once.
+    """
+
+    drive: _native.Drive
+    busy: bool
+    refused: bool
+    board: tuple[int, float, float]
+    asked: Asked | None
 
 
 def make_drive(
@@ -32,17 +56,22 @@ def make_drive(
     t0_s: float,
     period_s: float,
     ticks: int,
+    asked: list[Asked] | None = None,
 ) -> _native.Drive | None:
-    """Return what runs the ticks natively; None where a part has no native form."""
+    """Return what runs the ticks natively; None where a part has no native form.
+
+    A law that can answer for several runs at once is left to others and added to `asked`, if given.
+    """
     geometry = parts.vehicle.geometry
     if type(parts.orders) is not NoOrders:
         return None
     if type(geometry) is not BelievedGeometry:
         return None
-    law = native_law(parts.law, parts.own_terms)
-    reference = native_reference(parts.reference)
-    if law is None or reference is None:
+    stand_in = None if asked is None else _left_to(asked, parts.own_terms)
+    forms = native_forms(parts.law, parts.reference, parts.own_terms, stand_in)
+    if forms is None:
         return None
+    law, reference = forms
     known = (*_outer.TRACE_KEYS, *parts.own_terms)
     places = {key: place for place, key in enumerate(known)}
     return _native.Drive(
@@ -59,6 +88,18 @@ def make_drive(
     )
 
 
+def _left_to(
+    asked: list[Asked], own_terms: tuple[str, ...]
+) -> Callable[[GuardedLaw], _native.AnsweredLaw]:
+    """Return what stands for a law in native code while others answer, and notes it in `asked`."""
+
+    def stand_in(law: GuardedLaw) -> _native.AnsweredLaw:
+        asked.append(Asked(_native.AnsweredLaw(), law, own_terms))
+        return asked[-1].native
+
+    return stand_in
+
+
 def drive_to_end(
     drive: _native.Drive,
     parts: Parts,
@@ -66,14 +107,22 @@ def drive_to_end(
     intake: Intake,
     board: Callable[[], tuple[int, float, float]],
     check_safety: Callable[[float], None],
-) -> None:
-    """Run all ticks; raises as `check_safety` (asked at the host's time) and everybody on the way do."""
+    asked: list[Asked] | None = None,
+) -> Generator[Turn, int]:
+    """Run all ticks; raises as `check_safety` (asked at the host's time) and everybody on the way do.
+
+    Where `asked` is given others advance the drive: it is yielded, and why it stopped is sent in return.
+    """
     link, recorder = parts.link, parts.recorder
     assert isinstance(recorder, MemoryRecorder)  # else there is no pump
     stop = -1
     try:
         while stop != _native.DONE:
-            stop = drive.run(link.busy, bool(intake.refusal), board())
+            busy, refused = link.busy, bool(intake.refusal)
+            if asked is None:
+                stop = drive.run(busy, refused, board())
+            else:
+                stop = yield Turn(drive, busy, refused, board(), asked[0] if asked else None)
             if stop == _native.DRIVE_HEARD:
                 intake.hear(pump)
             elif stop == _native.DRIVE_TAKEN:

@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
 # What most callers need beside it stands in hil.runs.spec.
 __all__ = [
-    "Checked", "RunSpec", "camera_for", "checked", "execute", "execute_in_memory", "exit_status",
-    "judged_status", "new_folder",
+    "Checked", "InMemory", "RunSpec", "camera_for", "checked", "execute", "execute_in_memory",
+    "exit_status", "judged_status", "new_folder",
 ]  # fmt: skip
 
 
@@ -140,24 +140,46 @@ def _conducted(
     return (Ending("fault", str(fault)), None) if fault is not None else (ending, session.error)
 
 
+class InMemory:
+    """A run to be made without a record, in its parts: everything that is opened is closed with it.
+
+    `rig` is another one than the spec's target names; it is closed here. `law` is another one than a
+    new one of the spec. Raises BadInput, and RigFault where the target cannot be had.
+    """
+
+    def __init__(self, spec: RunSpec, rig: Rig | None = None, law: OuterLaw | None = None) -> None:
+        parameters, self._used, manifest = checked(spec)
+        law = law or make_law(spec.outer, spec.scenario)
+        self._rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed, spec.key)
+        try:
+            self._recorder = MemoryRecorder(manifest)
+            self._parts = make_parts(spec, self._rig, self._recorder, law)
+            self.session = Session(spec.scenario, self._parts, parameters, board_hashes)
+        except BaseException:
+            self._rig.close()
+            raise
+
+    def record(self) -> RunRecord:
+        """Return what a record would hold once the session has ended; raises what ended it otherwise."""
+        if self.session.error is not None:
+            raise fault_of(self.session.error, self._used) or self.session.error
+        return closed(self._recorder, self.session.ending, self._parts.link)
+
+    def close(self) -> None:
+        """Close the rig."""
+        self._rig.close()
+
+
 def execute_in_memory(
     spec: RunSpec, rig: Rig | None = None, law: OuterLaw | None = None
 ) -> RunRecord:
     """Run the spec and return what a record would hold, without writing one (spec.out is unused).
 
-    `rig` is another one than the spec's target names; it is closed here. `law` is another one than a
-    new one of the spec.
+    `rig` and `law` are those of `InMemory`.
     """
-    parameters, used, manifest = checked(spec)
-    law = law or make_law(spec.outer, spec.scenario)
-    rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed, spec.key)
+    run = InMemory(spec, rig, law)
     try:
-        recorder = MemoryRecorder(manifest)
-        parts = make_parts(spec, rig, recorder, law)
-        session = Session(spec.scenario, parts, parameters, board_hashes)
-        ending = session.run()
-        if session.error is not None:
-            raise fault_of(session.error, used) or session.error
-        return closed(recorder, ending, parts.link)
+        run.session.run()
+        return run.record()
     finally:
-        rig.close()
+        run.close()

@@ -48,7 +48,7 @@ class Intake:
         Ctrl-C is obeyed in waits (`hil.runs.interruption`): a host that is always late must come to one too.
         """
         if self._pump is not None:
-            self._native_until(self._pump, until_s)
+            self._go_on(self._pump, self._pump.begin(until_s, self._parts.link.busy))
             return
         rig = self._parts.rig
         waited = False
@@ -63,10 +63,16 @@ class Intake:
         if not waited:
             rig.wait(now_s)
 
-    def _native_until(self, pump: _native.Pump, until_s: float) -> None:
-        """Do the same in native code, which asks for what it does not know: procedures, texts."""
+    def periods(self, period_s: float, last_s: float) -> None:
+        """Do so for a period or more, until `last_s` at most, while a procedure is under way."""
+        if self._pump is not None:
+            self._go_on(self._pump, self._pump.begin_periods(period_s, last_s))
+            return
+        self.until(min(last_s, self._parts.rig.now_s() + period_s))
+
+    def _go_on(self, pump: _native.Pump, stop: int) -> None:
+        """Go on to the end in native code, which asks for what it does not know: procedures, texts."""
         link = self._parts.link
-        stop = pump.begin(until_s, link.busy)
         while stop != _native.REACHED:
             if stop == _native.HEARD:
                 self.hear(pump)

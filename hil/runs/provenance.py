@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import time
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
@@ -12,6 +13,7 @@ from hil.config.robot import BUILT_IN_PLANT
 from hil.control.references import notes
 from hil.core.errors import BadInput
 from hil.core.figures import metric_of
+from hil.core.newest import of_newest
 from hil.core.registries import ESTIMATORS, FIGURES, LOCALISERS, OUTER_LAWS, REFERENCES, VEHICLES
 from hil.core.registry import BUILT_IN, Entry, SourceText
 from hil.record.manifest import (
@@ -27,6 +29,7 @@ from hil.rigs.key_file import key_of_environment
 from hil.rigs.opening import REPLAY
 
 if TYPE_CHECKING:
+    from hil.config.scenario import Scenario
     from hil.runs.spec import RunSpec
 
 # Things in use, each with its kind.
@@ -57,7 +60,7 @@ def make_manifest(spec: RunSpec, parameters: Mapping[str, float], used: Used) ->
     now_us = time.time_ns() // 1000
     return Manifest(
         command=spec.command,
-        scenario=spec.scenario.model_dump(mode="json"),
+        scenario=pickle.loads(_tree(spec.scenario)),
         seed=spec.seed,
         target=spec.target,
         camera=spec.camera,
@@ -73,12 +76,21 @@ def make_manifest(spec: RunSpec, parameters: Mapping[str, float], used: Used) ->
         figures=[FigureTerm.of(metric_of(name)) for name in spec.scenario.own_figures],
         signed=_is_signed(spec),
         open_loop_of=spec.target.removeprefix(REPLAY) if spec.target.startswith(REPLAY) else "",
-        notes=notes(spec.scenario),
+        notes=list(_notes(spec.scenario)),
         versions=collect_versions(),
         git_revision=git_revision(),
         start_time_utc=datetime.fromtimestamp(now_us * 1e-6, UTC).isoformat(timespec="seconds"),
         start_unix_us=now_us,
     )
+
+
+_notes = of_newest(notes)
+
+
+@of_newest
+def _tree(scenario: Scenario) -> bytes:
+    """Return the scenario as a tree, packed: each record gets one of its own."""
+    return pickle.dumps(scenario.model_dump(mode="json"))
 
 
 def _is_signed(spec: RunSpec) -> bool:

@@ -10,13 +10,13 @@ import math
 from collections.abc import Callable, Generator
 from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hil.core.errors import RecordFault, RigFault
 from hil.core.registry import in_one_line
 from hil.record.schema import TRACE_KEYS
 from hil.runs import _native
-from hil.runs.driving import drive_to_end, make_drive
+from hil.runs.driving import Asked, Turn, drive_to_end, make_drive
 from hil.runs.intake import Intake
 from hil.runs.parts import Ending, Parts, Progress, Publish, Situation
 from hil.runs.watching import DIAGNOSIS, make_pump, make_watch
@@ -37,7 +37,7 @@ _LATE_RATIO = 0.5
 
 
 class Session:
-    """Runs the scenario once; `run` or `steps` may be called, once."""
+    """Runs the scenario once; `run`, `steps` or `turns` may be called, once."""
 
     def __init__(
         self,
@@ -76,20 +76,27 @@ class Session:
             pass
         return self.ending
 
-    def steps(self) -> Generator[Situation]:
+    def steps(self) -> Generator[Situation, int]:
         """Run all phases, pausing at each tick before the law is asked; then `ending` says how it was.
 
         Time of a simulated rig stands still in a pause. Closing the iterator stops the robot.
         """
         return self._phases(looked_at=True)
 
-    def _phases(self, *, looked_at: bool) -> Generator[Situation]:
+    def turns(self) -> Generator[Turn, int]:
+        """Run all phases, whose ticks others advance: `hil.runs.driving.Turn`.
+
+        A run whose ticks are Python's pauses nowhere. What others met on the way is thrown in.
+        """
+        return self._phases(looked_at=False, asked=[])
+
+    def _phases(self, *, looked_at: bool, asked: list[Asked] | None = None) -> Generator[Any, int]:
         try:
             self._connect()
             self._find_robot()
             self._pump_while(self._parts.orders.hold, math.inf)
             self._arm()
-            yield from self._control(looked_at=looked_at)
+            yield from self._control(looked_at=looked_at, asked=asked)
             self.ending = Ending("complete")
         except RigFault as fault:
             self.ending = Ending("fault", str(fault))
@@ -169,7 +176,7 @@ class Session:
             raise RigFault(f"board: acknowledged arming and stayed {link.state_name}")
         self._note("armed", link.state_name)
 
-    def _control(self, *, looked_at: bool) -> Generator[Situation]:
+    def _control(self, *, looked_at: bool, asked: list[Asked] | None) -> Generator[Any, int]:
         scenario, rig, law = self._scenario, self._parts.rig, self._parts.law
         period_s = 1.0 / scenario.control.rate_hz
         ticks = round(scenario.duration_s * scenario.control.rate_hz) + 1
@@ -178,10 +185,12 @@ class Session:
         rig.begin(self._t0_s)
         drive = None
         if self._pump is not None and not looked_at:
-            drive = make_drive(self._parts, self._pump, self._watch, self._t0_s, period_s, ticks)
+            plan = self._t0_s, period_s, ticks
+            drive = make_drive(self._parts, self._pump, self._watch, *plan, asked)
         if self._pump is not None and drive is not None:
             board, check = self._board_counts, self._check_safety
-            drive_to_end(drive, self._parts, self._pump, self._intake, board, check)
+            parts, intake = self._parts, self._intake
+            yield from drive_to_end(drive, parts, self._pump, intake, board, check, asked)
             return
         for tick in range(ticks):
             due_s = self._t0_s + tick * period_s
@@ -190,7 +199,8 @@ class Session:
             self._check_safety(now_s)
             estimate = self._estimate(now_s)
             reference = self._parts.reference.at(estimate.t_host_s - self._t0_s)
-            yield Situation(now_s - self._t0_s, reference, estimate)
+            if asked is None:
+                yield Situation(now_s - self._t0_s, reference, estimate)
             if tick == 0:
                 law.reset(reference, estimate)
             self._parts.orders.at_tick(reference, estimate)
@@ -231,7 +241,7 @@ class Session:
 
         With `feed`, zero set-points are sent at the outer rate meanwhile.
         """
-        rig = self._parts.rig
+        rig, link = self._parts.rig, self._parts.link
         period_s = 1.0 / self._scenario.control.rate_hz
         while waiting():
             now_s = rig.now_s()
@@ -239,7 +249,10 @@ class Session:
                 return False
             if feed:
                 self._send_wheels(0.0, 0.0)
-            self._intake.until(min(until_s, now_s + period_s))
+            if link.busy and not feed:
+                self._intake.periods(period_s, until_s)
+            else:
+                self._intake.until(min(until_s, now_s + period_s))
         return True
 
     def _check_safety(self, now_s: float) -> None:

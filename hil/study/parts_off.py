@@ -22,6 +22,7 @@ from hil.core.registries import ESTIMATORS, OUTER_LAWS
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
     from hil.core.registry import Entry
+    from hil.runs.execute import InMemory
 
 # A gain at zero is the part off: part -> gain.
 _BY_GAIN = {
@@ -83,14 +84,12 @@ def _stands_on_block(entry: Entry) -> bool:
         return False
 
 
-def run_without(
-    scenario: Scenario, outer: str, seed: int, without: str = ""
-) -> dict[str, float] | None:
-    """Return the figures of one run with a part of the law off; None where it ends early.
+def opened_without(scenario: Scenario, outer: str, seed: int, without: str = "") -> InMemory:
+    """Return the run, to be made, of a law with a part of it off.
 
     Raises BadInput for a part that the law does not have.
     """
-    from hil.runs.execute import RunSpec, execute_in_memory  # noqa: PLC0415
+    from hil.runs.execute import InMemory, RunSpec  # noqa: PLC0415
 
     if without and without not in parts_of(outer):
         raise BadInput(
@@ -107,9 +106,7 @@ def run_without(
         out=Path(),
         command="hil ablate",
     )
-    law = _law_without(scenario, outer, without)
-    record = execute_in_memory(spec, law=law)
-    return record.figures().values if record.manifest.outcome == "complete" else None
+    return InMemory(spec, law=_law_without(scenario, outer, without))
 
 
 def _changed(scenario: Scenario, outer: str, without: str) -> Scenario:

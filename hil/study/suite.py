@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hil.config.deck import CALM, Cell, Deck
@@ -24,11 +25,13 @@ from hil.core.errors import BadInput
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import BUILT_IN
 from hil.study.directions import in_drawn_axes
-from hil.study.parts_off import run_without
+from hil.study.parts_off import opened_without
+from hil.study.workers import OfGroups
 
 if TYPE_CHECKING:
     from hil.config.gains import Gains
     from hil.config.scenario import Scenario
+    from hil.runs.execute import InMemory
 
 YARDSTICK_LAW, YARDSTICK_SEED = "pid", 1
 MOST = 10.0
@@ -75,9 +78,18 @@ class OnSuite:
 
     def __call__(self, job: Job) -> Figures:
         """Return the figures of one run."""
+        return self.many([job])[0]
+
+    def many(self, jobs: Sequence[Job]) -> list[Figures]:
+        """Return the figures of runs made side by side."""
+        from hil.runs.together import figures_together  # noqa: PLC0415 - the search needs no target
+
+        found = figures_together([partial(self._opened, job) for job in jobs])
+        return [{name: values[name] for name in KEPT} if values else {} for values in found]
+
+    def _opened(self, job: Job) -> InMemory:
         scenario = with_gains(in_drawn_axes(self.scenarios[job.cell], job.cell), job.gains)
-        values = run_without(scenario, job.outer, job.seed, job.without)
-        return {name: values[name] for name in KEPT} if values else {}
+        return opened_without(scenario, job.outer, job.seed, job.without)
 
 
 def with_gains(scenario: Scenario, gains: Gains | None) -> Scenario:
@@ -160,7 +172,14 @@ class ByTask:
 
     def __call__(self, trial: Any) -> Figures:
         """Return the figures of one run with its cost; none of a run that ends early."""
-        figures = self.work(trial)
+        return self._with_cost(trial, self.work(trial))
+
+    def many(self, trials: Sequence[Any]) -> list[Figures]:
+        """Return the same of runs that the worker makes side by side."""
+        found = OfGroups(self.work)(trials)
+        return [self._with_cost(*one) for one in zip(trials, found, strict=True)]
+
+    def _with_cost(self, trial: Any, figures: Figures) -> Figures:
         if not figures:
             return figures
         task = trial.case.scenario.partition("-in-")[0]

@@ -12,6 +12,7 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from hil.config.gains import Gains
     from hil.config.robot import RobotConfig
     from hil.config.scenario import Scenario
+    from hil.runs.execute import InMemory
 
 # Figures of each run, in the order of the trials, named as in metrics.json; empty for a failed run.
 Evaluate = Callable[[Sequence["Trial"]], Sequence[Figures]]
@@ -360,7 +362,17 @@ class OnTarget:
 
     def __call__(self, trial: Trial) -> Figures:
         """Return the figures of one run, which leaves no record behind."""
-        from hil.runs.execute import RunSpec, execute_in_memory  # noqa: PLC0415 - the search needs no target
+        return self.many([trial])[0]
+
+    def many(self, trials: Sequence[Trial]) -> list[Figures]:
+        """Return the figures of runs made side by side."""
+        from hil.runs.together import figures_together  # noqa: PLC0415 - the search needs no target
+
+        makers = [partial(self._opened, trial) for trial in trials]
+        return [values or {} for values in figures_together(makers)]
+
+    def _opened(self, trial: Trial) -> InMemory:
+        from hil.runs.execute import InMemory, RunSpec  # noqa: PLC0415
 
         spec = RunSpec(
             scenario=in_drawn_axes(
@@ -375,5 +387,4 @@ class OnTarget:
             out=Path(),
             command="hil tune",
         )
-        record = execute_in_memory(spec)
-        return record.figures().values if record.manifest.outcome == "complete" else {}
+        return InMemory(spec)

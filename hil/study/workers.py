@@ -1,20 +1,55 @@
-"""What a worker process owes its parent: it ends when the parent is gone, whatever killed that."""
+"""What a worker process owes its parent: it ends when the parent is gone, whatever killed that.
+
+And what it is given: jobs in groups, for functions that do several of them side by side.
+"""
 
 from __future__ import annotations
 
+import itertools
 import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.process import BaseProcess
-from typing import TypeVar
+from typing import Any, Generic, TypeVar
 
 from hil.runs.interruption import CtrlC
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
+
+# So many jobs of a function that does several side by side go to a worker at once (docs/performance.md).
+SIDE_BY_SIDE = 16
+# A worker gets so many groups at least, or there would be none for one that is done early.
+_GROUPS_A_WORKER = 3
+
+
+class OfGroups(Generic[Job, Result]):
+    """Does a group of jobs: side by side by the function's `many(jobs)`, where it has that."""
+
+    def __init__(self, function: Callable[[Job], Result]) -> None:
+        self._function = function
+
+    def __call__(self, jobs: Sequence[Job]) -> list[Result]:
+        """Return the results of the jobs, in their order."""
+        many: Any = getattr(self._function, "many", None)
+        return [self._function(job) for job in jobs] if many is None else list(many(jobs))
+
+
+def group_size(function: Callable[..., object], jobs: int, workers: int) -> int:
+    """Return how many of so many jobs a worker is given at once."""
+    if not hasattr(function, "many"):
+        return 1
+    return max(1, min(SIDE_BY_SIDE, jobs // (_GROUPS_A_WORKER * max(workers, 1))))
+
+
+def groups_of(jobs: Iterable[Job], size: int) -> Iterator[tuple[Job, ...]]:
+    """Yield the jobs in groups of `size`, the last one of what is left."""
+    rest = iter(jobs)
+    while group := tuple(itertools.islice(rest, size)):
+        yield group
 
 
 def submit(

@@ -13,7 +13,6 @@ from collections.abc import Callable, Generator, Mapping
 from hil.core.errors import RigFault
 from hil.core.rig import Rig
 from hil.wire import dialect, identity
-from hil.wire.framing import BOARD_COMPONENT, BOARD_SYSTEM
 from hil.wire.link import BoardLink, Procedure, enum_name
 from hil.wire.messages import arming_params, set_parameter_message
 
@@ -104,7 +103,7 @@ def download_parameters(link: BoardLink) -> Procedure:
     link.parameter_names.clear()
     yield from _ask_parameter(link, 0)
     for index in range(1, link.parameter_count):
-        _request_parameter(link, index)
+        link.request_parameter(index)
         yield from _wait(link, lambda: False, _PARAMETER_PACE_S)
     yield from _wait(link, lambda: len(link.parameter_names) == link.parameter_count, _REPLY_S)
     for index in range(1, link.parameter_count):
@@ -112,14 +111,10 @@ def download_parameters(link: BoardLink) -> Procedure:
             yield from _ask_parameter(link, index)
 
 
-def _request_parameter(link: BoardLink, index: int) -> None:
-    link.send(dialect.MAVLink_param_request_read_message(BOARD_SYSTEM, BOARD_COMPONENT, b"", index))
-
-
 def _ask_parameter(link: BoardLink, index: int) -> Procedure:
     yield from _ask(
         link,
-        lambda _: _request_parameter(link, index),
+        lambda _: link.request_parameter(index),
         lambda: index in link.parameter_names,
         f"the request for parameter {index}",
     )
@@ -187,13 +182,13 @@ def store(link: BoardLink) -> Procedure:
 
 def _wait(
     link: BoardLink, done: Callable[[], bool], timeout_s: float
-) -> Generator[None, None, bool]:
-    """Wait until `done`; return whether it came before the time-out."""
+) -> Generator[float, None, bool]:
+    """Wait until `done`, which looks at nothing but what the board said; return whether it came in time."""
     end_s = link.t_s + timeout_s
     while not done():
         if link.t_s >= end_s:
             return False
-        yield
+        yield end_s
     return True
 
 
@@ -233,7 +228,7 @@ def _command(
         raise RigFault(f"board: refuses to {what} ({enum_name('MAV_RESULT', result)}){why}")
 
 
-def _explanation(link: BoardLink, start_s: float) -> Generator[None, None, str]:
+def _explanation(link: BoardLink, start_s: float) -> Generator[float, None, str]:
     """Wait for what the board says about a refusal after `start_s`; return it, or nothing."""
     yield from _wait(link, lambda: bool(link.texts) and link.texts[-1].t_host_s > start_s, _TEXT_S)
     return f": {link.texts[-1].text}" if link.texts else ""

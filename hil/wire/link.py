@@ -19,7 +19,9 @@ from hil.wire.framing import FrameWriter, decode
 from hil.wire.messages import command_message
 
 Tap = Callable[[float, bytes], None]
-Procedure = Generator[None, None, None]
+# Gives the host time by which it is to be asked again should nothing come that it may look at: a message, a
+# heartbeat, or a frame that is signed. To be asked oftener changes nothing.
+Procedure = Generator[float, None, None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +62,6 @@ class BoardLink:
         self.acks: dict[int, int] = {}
         self._handlers: dict[int, Callable[[Any], None]] = {
             dialect.MAVLINK_MSG_ID_STATUSTEXT: self._on_statustext,
-            dialect.MAVLINK_MSG_ID_PARAM_VALUE: self._on_param_value,
             dialect.MAVLINK_MSG_ID_COMMAND_ACK: self._on_command_ack,
             dialect.MAVLINK_MSG_ID_BOARD_INFO: self._on_board_info,
         }
@@ -144,7 +145,7 @@ class BoardLink:
         """Move the procedure under way one step on."""
         if self._procedure is not None:
             try:
-                next(self._procedure)
+                self.native.rest_until(next(self._procedure))
             except StopIteration:
                 self._procedure = None
             except RigFault:
@@ -160,6 +161,7 @@ class BoardLink:
     def begin(self, procedure: Procedure) -> None:
         """Let `poll` carry a procedure out, one step a call; it replaces one under way."""
         self._procedure = procedure
+        self.native.rest_until(-math.inf)
 
     def stop_now(self, t_host_s: float) -> None:
         """Send an emergency stop three times without waiting; for the way out of a fault.
@@ -186,6 +188,9 @@ class BoardLink:
 
     def heard(self, msg_id: int, frame: bytes) -> None:
         """Take a message that only procedures and people need."""
+        if msg_id == dialect.MAVLINK_MSG_ID_PARAM_VALUE:  # some sixty of them before a run
+            self._on_param_value(*_wire.parameter(frame))
+            return
         handler = self._handlers.get(msg_id)
         if handler is not None:
             handler(decode(msg_id, frame))
@@ -194,10 +199,10 @@ class BoardLink:
         self.texts.append(StatusText(self.t_s, message.severity, message.text))
         self.texts_heard += 1
 
-    def _on_param_value(self, message: Any) -> None:
-        self.parameters[message.param_id] = message.param_value
-        self.parameter_count = message.param_count
-        self.parameter_names[message.param_index] = message.param_id
+    def _on_param_value(self, name: str, value: float, count: int, index: int) -> None:
+        self.parameters[name] = value
+        self.parameter_count = count
+        self.parameter_names[index] = name
 
     def _on_command_ack(self, message: Any) -> None:
         self.acks[message.command] = message.result
@@ -220,6 +225,10 @@ class BoardLink:
     def send_command(self, command: int, confirmation: int, *params: float) -> None:
         """Send a COMMAND_LONG; parameters not given are 0."""
         self.send(command_message(command, *params, confirmation=confirmation))
+
+    def request_parameter(self, index: int) -> None:
+        """Ask the board for the parameter with this index."""
+        self._write(self.native.writer.parameter_request(index), self.t_s)
 
     def ask_time(self, t_s: float) -> None:
         """Ask for the board's time; the answer is one more exchange of `clock`."""

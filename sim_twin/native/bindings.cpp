@@ -19,6 +19,7 @@
 namespace nb = nanobind;
 using namespace nb::literals;
 
+void bind_lanes(nb::module_& m);   // lanes_bind.cpp
 void bind_render(nb::module_& m);  // render_bind.cpp
 void bind_rig(nb::module_& m);     // rig_bind.cpp
 
@@ -253,6 +254,7 @@ NB_MODULE(_native, m) {
   bind_processor(m);
   bind_plant(m);
   bind_kernel(m);
+  bind_lanes(m);
   bind_render(m);
   bind_rig(m);
 }

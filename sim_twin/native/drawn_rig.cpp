@@ -4,19 +4,55 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
+
+#include "lanes.hpp"
 
 namespace twin {
 namespace {
 
 bool within(const Span& span, double t_s) { return span.first <= t_s && t_s < span.second; }
 
+core::RigFault fault(const std::runtime_error& error) {
+  return core::RigFault(std::string("twin: ") + error.what() + "; check the robot's parameters");
+}
+
 }  // namespace
 
 void DrawnRig::wait(double until_s) {
+  do {
+    move(until_s);
+  } while (!arrived(until_s));
+}
+
+void DrawnRig::move(double until_s) {
   try {
-    rig_.wait(until_s, poses_ > 0 ? poses_ : 1);
+    rig_.advance(until_s);
   } catch (const std::runtime_error& error) {
-    throw core::RigFault(std::string("twin: ") + error.what() + "; check the robot's parameters");
+    throw fault(error);
+  }
+}
+
+void DrawnRig::move_together(Wait* waits, std::size_t count) {
+  std::vector<Leg> legs(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    Rig& rig = static_cast<DrawnRig*>(waits[i].rig)->rig_;
+    legs[i].kernel = &rig.kernel();
+    legs[i].t_us = rig.aim(waits[i].until_s);
+  }
+  advance_together(legs.data(), count);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!legs[i].failed) {
+      static_cast<DrawnRig*>(waits[i].rig)->rig_.reached(legs[i].reached_us);
+      continue;
+    }
+    try {
+      std::rethrow_exception(legs[i].failed);
+    } catch (const std::runtime_error& error) {
+      waits[i].failed = std::make_exception_ptr(fault(error));
+    } catch (...) {
+      waits[i].failed = std::current_exception();
+    }
   }
 }
 

@@ -32,6 +32,9 @@ class DrawnRig final : public core::SimulatedRig {
 
   double now_s() const override { return rig_.now_s(); }
   void wait(double until_s) override;
+  void move(double until_s) override;
+  bool arrived(double until_s) override { return rig_.arrive(until_s, poses_ > 0 ? poses_ : 1); }
+  void move_together(Wait* waits, std::size_t count) override;
   std::string read() override { return rig_.read(); }
   void write(const std::string& data) override {
     backlog_.write(rig_.now_s(), static_cast<std::int64_t>(data.size()), "twin: ");
@@ -45,6 +48,7 @@ class DrawnRig final : public core::SimulatedRig {
  private:
   void see(const Exposed& taken);
   void show(Exposed taken);
+
   Rig& rig_;
   DrawnPoses& drawn_;
   Claim claim_;

@@ -56,7 +56,22 @@ Exposure Shutter::expose() {
   return {index_, start_s, end_s, clock_s, std::max(std::max(arrival_s, end_s), last_arrival_s_)};
 }
 
-double DrawnPoses::bias(const std::vector<Wave>& waves, const PoseSample& pose) {
+DrawnPoses::DrawnPoses(const DrawnOptions& options, const Chance& chance)
+    : options_(options), chance_(chance) {
+  for (Waves& waves : places_) {
+    for (Wave& one : waves) one = wave();
+  }
+}
+
+Wave DrawnPoses::wave() {
+  const auto between = [this](double low, double high) { return low + (high - low) * chance_.number(); };
+  const double number = 2.0 * kPi / between(kShortest_m, kLongest_m);
+  const double way = between(-kPi, kPi);
+  const double turns = static_cast<double>(chance_.below(2 * kMostPerTurn + 1)) - kMostPerTurn;
+  return {number * std::cos(way), number * std::sin(way), turns, between(-kPi, kPi)};
+}
+
+double DrawnPoses::bias(const Waves& waves, const PoseSample& pose) {
   double total = 0.0;
   for (const Wave& w : waves) {
     total += std::sin(w.per_x * pose.x_m + w.per_y * pose.y_m + w.turns * pose.theta_rad + w.phase);

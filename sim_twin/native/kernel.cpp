@@ -11,7 +11,6 @@ namespace {
 constexpr std::uint8_t kGray[4] = {0b00, 0b10, 0b11, 0b01};
 // A jam is a damper stiff enough to hold a stalled motor's torque below 0.1 rad/s.
 constexpr double kJam_n_m_s_rad = 12.0;
-constexpr double kRunaway_rad_s = 1e4;
 
 // The whole number at or below x, without the call that floor is on older processors.
 inline std::int64_t floored(double x) {
@@ -57,6 +56,16 @@ void Encoder::move(double angle_rad, double t0_us, double h_us, const FaultState
   } while (count_ != last);
 }
 
+std::int64_t Encoder::turn(double angle_rad) {
+  angle_rad_ = angle_rad;
+  const std::int64_t before = count_;
+  count_ = floored(position(angle_rad));
+  pins_ = kGray[count_ & 3];
+  return count_ - before;
+}
+
+bool Encoder::in_order() const { return pins_ == kGray[count_ & 3]; }
+
 Kernel::Kernel(const PlantParams& params, const KernelOptions& options, std::shared_ptr<BoardSide> board)
     : plant_(params), options_(options), board_(std::move(board)),
       encoders_{Encoder(options.counts_per_turn), Encoder(options.counts_per_turn)} {
@@ -80,17 +89,16 @@ void Kernel::reset(double x_m, double y_m, double theta_rad) {
   board_->sent.clear();
   const std::uint8_t pins[2] = {encoders_[0].pins(), encoders_[1].pins()};
   board_->set_reset(false, 0, pins);
-  remember();
+  remember({x_m, y_m, theta_rad});
 }
 
-void Kernel::remember() {
-  const StateVector& x = plant_.state();
-  poses_[static_cast<std::size_t>(pose_count_) % kPoses] = {x[kX], x[kY], x[kTheta]};
+void Kernel::remember(const PoseSample& pose) {
+  poses_[static_cast<std::size_t>(pose_count_) % kPoses] = pose;
   ++pose_count_;
 }
 
 std::int64_t Kernel::advance(std::int64_t t_us) {
-  while (time_us_ < t_us && board_->sent.empty()) {
+  while (goes_on(t_us)) {
     coast(t_us);
     if (time_us_ < t_us) step();
   }
@@ -111,7 +119,7 @@ void Kernel::coast(std::int64_t t_us) {
   while (time_us_ + options_.step_us < until_us) {
     plant_.rest_on();
     time_us_ += options_.step_us;
-    if (time_us_ % kPoseSpacing_us == 0) remember();
+    if (time_us_ % kPoseSpacing_us == 0) remember({x[kX], x[kY], x[kTheta]});
   }
   sag_v_ = 0.0;
   battery_v_ = plant_.battery_v(drive_, sag_v_);
@@ -192,18 +200,27 @@ void Kernel::integrate() {
   sag_v_ = end[kBatterySag];
 }
 
+void Kernel::set_faults() {
+  if (faults_.empty()) return;
+  const std::int64_t since_us = std::max<std::int64_t>(time_us_ - begin_us_, 0);
+  fault_ = faults_.at(1e-6 * static_cast<double>(since_us));
+  follow_reset_line();
+}
+
 void Kernel::step() {
-  const auto t0_us = static_cast<double>(time_us_);
-  const auto h_us = static_cast<double>(options_.step_us);
-  if (!faults_.empty()) {
-    const std::int64_t since_us = std::max<std::int64_t>(time_us_ - begin_us_, 0);
-    fault_ = faults_.at(1e-6 * static_cast<double>(since_us));
-    follow_reset_line();
-  }
+  set_faults();
   set_drive();
   const StateVector& x = plant_.state();
   const double wheel_rad[2] = {x[kWheelL], x[kWheelR]};
   integrate();
+  end_step(wheel_rad);
+}
+
+// All of a step but the robot's motion; wheel_rad: the wheels at its begin.
+void Kernel::end_step(const double wheel_rad[2]) {
+  const auto t0_us = static_cast<double>(time_us_);
+  const auto h_us = static_cast<double>(options_.step_us);
+  const StateVector& x = plant_.state();
   // Before the encoders, which would count every turn of a wheel that has run away; NaN fails too.
   if (!(std::fabs(x[kOmegaL]) + std::fabs(x[kOmegaR]) < kRunaway_rad_s)) {
     throw std::runtime_error("the simulated robot's state diverges");
@@ -227,7 +244,7 @@ void Kernel::step() {
   time_us_ += options_.step_us;
   battery_v_ = plant_.battery_v(drive_, sag_v_);
   board_->advance_to(time_us_, battery_v_);
-  if (time_us_ % kPoseSpacing_us == 0) remember();
+  if (time_us_ % kPoseSpacing_us == 0) remember({x[kX], x[kY], x[kTheta]});
 }
 
 PoseSample Kernel::pose_at(double t_us) const {

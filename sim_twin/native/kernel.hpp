@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -22,6 +23,10 @@ class Encoder {
   // Appends the edges of a step from t0_us to t0_us + h_us that ends at angle_rad.
   void move(double angle_rad, double t0_us, double h_us, const FaultState::Side& fault, int side,
             std::vector<PinEdge>& edges);
+  // The same where nobody asks for the edges and no wire is at fault: returns the counts moved by.
+  std::int64_t turn(double angle_rad);
+  // Whether the pins are those of its place, as without a fault.
+  bool in_order() const;
   // Whether the wheel is where the last move left it.
   bool stands_at(double angle_rad) const { return angle_rad == angle_rad_; }
   std::uint8_t pins() const { return pins_; }
@@ -47,6 +52,16 @@ struct PoseSample {
   double x_m = 0.0, y_m = 0.0, theta_rad = 0.0;
 };
 
+// Steps of a kernel that were worked out elsewhere (lanes.hpp): for each step's end the places of the robot
+// and its wheels, one row after the other; `lanes` numbers lie between two of one row.
+struct Track {
+  const double* first = nullptr;
+  std::ptrdiff_t row = 0, lanes = 0;
+  std::int64_t steps = 0;
+  enum Column : int { kXOf, kYOf, kThetaOf, kWheelLeftOf, kWheelRightOf, kColumns };
+  double at(std::int64_t step, int column) const { return first[step * row + column * lanes]; }
+};
+
 struct KernelOptions {
   std::int64_t step_us = 100;
   int counts_per_turn = 1920;
@@ -69,6 +84,18 @@ class Kernel {
   // Run until t_us is reached, or to the end of the step in which the board has sent something.
   // Returns the time reached. Throws when the state diverges.
   std::int64_t advance(std::int64_t t_us);
+  // For those who work steps out elsewhere. `advance` is: while it has to go on (`goes_on`), coast, and where it
+  // still has to, take a `step`, or as many as `plain_steps` says elsewhere and `follow` them.
+  bool goes_on(std::int64_t t_us) const { return time_us_ < t_us && board_->sent.empty(); }
+  void coast(std::int64_t t_us);
+  void step();
+  // How many steps towards t_us are those of a robot that rolls, under one duty and with nothing acting from
+  // outside; the board is asked after the last one at the earliest. 0: take a `step`.
+  std::int64_t plain_steps(std::int64_t t_us);
+  void follow(const Track& track, const StateVector& end);
+  const Plant& plant() const { return plant_; }
+  const Drive& drive() const { return drive_; }
+  std::int64_t step_us() const { return options_.step_us; }
   void receive(std::int64_t t_us, std::string bytes) { board_->receive(t_us, std::move(bytes)); }
   std::vector<Chunk> take_sent();
 
@@ -81,14 +108,17 @@ class Kernel {
   std::int64_t true_count(int side) const { return encoders_[side].true_count(); }
 
  private:
-  void step();
-  void coast(std::int64_t t_us);
+  void set_faults();
+  void end_step(const double wheel_rad[2]);
+  std::int64_t steps_to(std::int64_t t_us) const;
+  std::int64_t steady_steps() const;
+  bool edges_are_counts() const;
   void follow_reset_line();
   void set_drive();
   void integrate();
   LoadVector loads_now() const;
   void follow_outside(double h_s);
-  void remember();
+  void remember(const PoseSample& pose);
 
   static constexpr std::int64_t kNever_us = std::int64_t{1} << 60;
   static constexpr std::int64_t kPoseSpacing_us = 1000;

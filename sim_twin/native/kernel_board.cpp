@@ -137,4 +137,16 @@ std::int64_t HostBoard::quiet_until_us() const {
   return received_.empty() ? due_us : std::min(due_us, received_.front().t_us);
 }
 
+bool HostBoard::takes_turns(const std::uint8_t pins[2]) const {
+  return !held_ && edges_.empty() && encoder_[0].last_ab == pins[0] && encoder_[1].last_ab == pins[1];
+}
+
+// What quadrature_update makes of that many edges one after the other.
+void HostBoard::turned(const std::int64_t counts[2], const std::uint8_t pins[2]) {
+  for (int side = 0; side < 2; ++side) {
+    encoder_[side].counts += static_cast<std::int32_t>(counts[side]);
+    encoder_[side].last_ab = pins[side];
+  }
+}
+
 }  // namespace twin

@@ -38,6 +38,11 @@ class BoardSide {
   virtual void advance_to(std::int64_t t_us, double battery_v) = 0;
   // Before this nothing is due on the board, unless an edge or bytes come; what is not known is now.
   virtual std::int64_t quiet_until_us() const { return 0; }
+  // Whether edges that all lie before the time it is quiet until may be handed over as how far each encoder
+  // has turned; `pins` are their levels now. A board whose pins differ from them takes edges one by one.
+  virtual bool takes_turns(const std::uint8_t /*pins*/[2]) const { return false; }
+  // Counts that both encoders have moved by since the last advance, and the levels of their pins after it.
+  virtual void turned(const std::int64_t /*counts*/[2], const std::uint8_t /*pins*/[2]) {}
   // Share of the battery voltage on a motor (0 left, 1 right), -1..1.
   virtual double duty(int side) const = 0;
   // What the UART has sent; t_us is the time its last byte left. Emptied by the caller.
@@ -60,6 +65,8 @@ class HostBoard final : public BoardSide {
   void receive(std::int64_t t_us, std::string bytes) override;
   void advance_to(std::int64_t t_us, double battery_v) override;
   std::int64_t quiet_until_us() const override;
+  bool takes_turns(const std::uint8_t pins[2]) const override;
+  void turned(const std::int64_t counts[2], const std::uint8_t pins[2]) override;
   double duty(int side) const override { return duty_[side]; }
 
  private:

@@ -1,6 +1,8 @@
 #include "kernel_events.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace twin {
 namespace {
@@ -97,6 +99,19 @@ FaultState Faults::at(double t_s) const {
     }
   }
   return out;
+}
+
+double Faults::steady_until_s(double t_s) const {
+  double until_s = std::numeric_limits<double>::infinity();
+  for (const Fault& fault : items_) {
+    if (t_s < fault.start_s) {
+      until_s = std::min(until_s, fault.start_s);
+    } else if (t_s < fault.end_s) {
+      if (fault.kind == FaultKind::kEncoderNoise) return t_s;
+      until_s = std::min(until_s, fault.end_s);
+    }
+  }
+  return until_s;
 }
 
 }  // namespace twin

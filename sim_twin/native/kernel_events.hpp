@@ -83,6 +83,8 @@ class Faults {
   void add(const Fault& fault) { items_.push_back(fault); }
   bool empty() const { return items_.empty(); }
   FaultState at(double t_s) const;
+  // Until when `at` gives what it gives at t_s; t_s itself where it changes all the time.
+  double steady_until_s(double t_s) const;
 
  private:
   std::vector<Fault> items_;

@@ -5,6 +5,7 @@
 
 #include <array>
 
+#include "plant_terms.hpp"
 #include "two_lanes.hpp"
 
 namespace twin {
@@ -60,19 +61,6 @@ enum State : int {
 };
 using StateVector = std::array<double, kStates>;
 
-// The same states two by two, as the integration works on them.
-enum PairIndex : int {
-  kPosition,  // X, Y
-  kTurn,      // theta, theta_dot
-  kEta,       // eta1, eta2
-  kCurrent,
-  kWheel,
-  kOmega,    // left, right
-  kBattery,  // charge, nothing
-  kPairs
-};
-using PairedState = std::array<Pair, kPairs>;
-
 // What acts on the robot from outside besides the bridge, with the scenario's name for it
 // (hil.config.events.Target). Accelerations add to eta1_dot, eta2_dot and theta_ddot; forces and
 // the torque act at the centre of mass in the body frame; a wheel load is a torque that pushes backward
@@ -107,6 +95,14 @@ struct Drive {             // left, right; held over a step
   Pair jam = {0.0, 0.0};   // N m s/rad, gear jam as a stiff damper
 };
 
+// What a step takes into account. A robot that rolls with nothing acting from outside has steps of its own:
+// every term that is known to be 0 lengthens the chain of results that wait for each other. kLoads: jams too;
+// kAll: robots that slip or are lifted too.
+enum class Acts { kNothing, kLoads, kAll };
+
+// A wheel that turns faster has run away.
+constexpr double kRunaway_rad_s = 1e4;
+
 class Plant {
  public:
   explicit Plant(const PlantParams& params);
@@ -131,62 +127,19 @@ class Plant {
     rest_.holds = false;
     return x_;
   }
+  // Whether the wheels roll on the floor without slip, which is what can be reckoned side by side (lanes.hpp).
+  bool rolls() const { return !p_.slip && !p_.lifted; }
+  bool castor() const { return p_.castor; }
+  const Terms<double>& terms() const { return t_; }
   double battery_v(const Drive& drive, double sag_v) const;   // at the terminals, now
   double charge_after(double h_s, const Drive& drive) const;  // at the current drawn now
   StateVector derivative(const StateVector& x, const Drive& drive, const LoadVector& load) const;
 
  private:
-  struct Sides {        // left, right
-    Pair current_dot;   // A/s, one motor
-    Pair torque_n_m;    // all motors of the side at the wheels, friction and load taken off
-    Pair rolling_sign;  // smoothed sign of the rim speed
-  };
-  struct Acceleration {
-    double eta1_dot, eta2_dot, theta_ddot;  // m/s^2, m/s^2, rad/s^2, body frame
-    Pair omega_dot;                         // rad/s^2
-  };
-  // Each with and without what acts from outside (`load`, jams): a rolling robot's steps are mostly without,
-  // and every term that is known to be 0 lengthens the chain of results that wait for each other.
-  template <bool kPlain>
-  TWIN_INLINE Sides sides(Pair current_a, Pair omega_rad_s, const Drive& drive, const LoadVector& load,
-                          double battery_v) const;
-  // Quotients that do not change, because a division costs as much as ten products.
-  struct Derived {
-    double per_radius, per_inductance, per_stribeck, per_charge;
-    double side_inertia;                   // kg m^2, wheels and reflected rotors of one side
-    double emf_v_s, gear_n_m_a;            // V per rad/s and N m per A at the wheel
-    double weight_n;                       // m g
-    double roll_n;                         // rolling resistance of one side
-    double slide_front_n, slide_rear_n;    // sliding friction of the wheels in front, in the rear
-    double castor_n;                       // friction of the castor
-    double per_mass_rim, per_inertia_rim;  // 1 / (m + rims), 1 / (I + m d0^2 + rims): (S'MS)^-1
-  };
-
-  struct Heading {
-    double cos, sin;
-  };
-
-  static Derived derive(const PlantParams& p);
-  static Heading heading(double theta_rad);
-  TWIN_INLINE static Heading turned(const Heading& from, double by_rad);
-  [[gnu::cold, gnu::noinline]] static Heading turned_far(const Heading& from, double by_rad);
-  TWIN_INLINE double battery_v(double charge_ratio, double draw_a, double sag_v) const;
-  TWIN_INLINE double draw_a(Pair current_a, const Drive& drive) const;  // from the battery
-  TWIN_INLINE double brake(double torque_n_m, double omega_rad_s) const;
-  template <bool kPlain>
+  double draw_a(const Drive& drive) const;  // from the battery, now
+  template <Acts kActs>
   void advance(double h_s, const Drive& drive, const LoadVector& begin, const LoadVector& middle,
                const LoadVector& end);
-  template <bool kPlain>
-  TWIN_INLINE PairedState derivative(const PairedState& x, const Heading& at, const Drive& drive,
-                                     const LoadVector& load) const;
-  template <bool kPlain>
-  TWIN_INLINE Acceleration constrained(const PairedState& x, const Sides& both, const LoadVector& load,
-                                       const double* gravity) const;
-  Acceleration slipping(const PairedState& x, const Sides& both, const LoadVector& load,
-                        const double* gravity) const;
-  Acceleration hanging(const Sides& both) const;
-  Pair castor_drag(const PairedState& x, double grip_ratio, double v_s) const;
-  TWIN_INLINE Pair rolling(double eta1, double w) const;  // wheel speeds, or their rates from the body's
 
   struct Rest {  // a step that changed nothing but the charge
     bool holds = false;
@@ -196,9 +149,12 @@ class Plant {
   bool is_rest(const StateVector& before) const;
 
   PlantParams p_;
-  Derived d_;
+  Terms<double> t_;
   StateVector x_{};
   Rest rest_;
 };
+
+// Cosines and sines of n headings, as a step of one robot takes them.
+void headings(const double* theta_rad, double* cos, double* sin, int n);
 
 }  // namespace twin

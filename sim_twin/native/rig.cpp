@@ -36,13 +36,15 @@ void Rig::wait(double until_s, int poses) {
   } while (!arrive(until_s, poses));
 }
 
-void Rig::advance(double until_s) {
+void Rig::advance(double until_s) { reached(kernel_.advance(aim(until_s))); }
+
+std::int64_t Rig::aim(double until_s) {
   const double frame_s = next_frame_ ? next_frame_->arrival_s : kFar_s;
   const double bytes_s = uplink_.empty() ? kFar_s : uplink_.front().first;
   target_s_ = std::min(std::min(until_s, frame_s), bytes_s);
   carry(target_s_);
-  const std::int64_t target_us = kernel_us(target_s_);
-  reached_ = kernel_.advance(target_us) >= target_us;
+  target_us_ = kernel_us(target_s_);
+  return target_us_;
 }
 
 bool Rig::arrive(double until_s, int poses) {

@@ -44,6 +44,10 @@ class Rig {
   // The same in halves: `advance` runs towards the next arrival, `arrive` tells whether it was one.
   void advance(double until_s);
   bool arrive(double until_s, int poses);
+  // `advance` in parts, for kernels that move side by side (lanes.hpp): the kernel's time to be reached, and
+  // what was reached.
+  std::int64_t aim(double until_s);
+  void reached(std::int64_t t_us) { reached_ = t_us >= target_us_; }
 
   std::string read();  // what has arrived from the board
   void send(const std::string& data);
@@ -51,6 +55,7 @@ class Rig {
   std::optional<Exposed> take_frame();
   PoseSample pose_at(double t_s) const;
   const Kernel& kernel() const { return kernel_; }
+  Kernel& kernel() { return kernel_; }
 
  private:
   struct Unsent {
@@ -72,6 +77,7 @@ class Rig {
   std::optional<Exposure> next_frame_;
   double now_s_;
   double target_s_ = 0.0;
+  std::int64_t target_us_ = 0;
   bool reached_ = false, begun_ = false;
   std::deque<Unsent> unsent_;
   std::deque<Arrival> uplink_;

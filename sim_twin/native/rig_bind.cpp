@@ -124,16 +124,12 @@ void bind_parts(nb::module_& m) {
       .def(
           "__init__",
           [](twin::DrawnPoses* self, const std::array<double, 7>& error, bool swapped, double shift_m,
-             const std::array<std::vector<std::array<double, 4>>, 3>& places, const Words& chance) {
-            std::array<std::vector<twin::Wave>, 3> waves;
-            for (std::size_t i = 0; i < 3; ++i) {
-              for (const auto& w : places[i]) waves[i].push_back({w[0], w[1], w[2], w[3]});
-            }
+             const Words& chance) {
             new (self) twin::DrawnPoses(
                 {error[0], error[1], error[2], error[3], error[4], error[5], error[6], swapped, shift_m},
-                waves, chance_of(chance));
+                chance_of(chance));
           },
-          "error"_a, "swapped"_a, "shift_m"_a, "places"_a, "chance"_a)
+          "error"_a, "swapped"_a, "shift_m"_a, "chance"_a)
       .def("measure", &measured, "x_m"_a, "y_m"_a, "theta_rad"_a);
 }
 

@@ -278,9 +278,12 @@ def test_the_vehicle_is_among_the_sources_that_are_looked_at():
 )
 def test_a_replaced_part_switches_native_laws_off(owner, name, value, monkeypatch):
     """Whoever replaces a function or a number of a law has it used: native code would not."""
+    reference = make_reference(REFERENCES["circle"])
     assert translated.native_law(shipped()) is not None
+    assert translated.native_forms(shipped(), reference) is not None
     monkeypatch.setattr(owner, name, value)
     assert translated.native_law(shipped()) is None
+    assert translated.native_forms(shipped(), reference) is None
 
 
 def test_a_replaced_block_is_not_taken_for_the_built_in_one(monkeypatch):
@@ -301,6 +304,13 @@ class Slotted:
 def test_a_reference_of_any_shape_is_asked_in_python():
     """One without a dictionary too."""
     assert translated.native_reference(Slotted()) is None
+    assert translated.native_forms(shipped(), Slotted()) is None
+
+
+def test_a_part_that_is_gone_switches_native_laws_off(monkeypatch):
+    """One that was deleted is as one that was replaced."""
+    monkeypatch.delattr(let_go, "_WAIT_S")
+    assert translated.native_law(shipped()) is None
 
 
 def test_a_law_may_change_its_step_on_the_way():

@@ -21,3 +21,20 @@ def written(path: Path, text: str) -> Path:
     """Write a file and return its path."""
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def figure_text(name: str, body: str) -> str:
+    """Return a file with one figure of this body."""
+    return (
+        "import time, random\nimport numpy as np\nimport hil\n\n\n"
+        f'@hil.figure("{name}", unit="m", meaning="a test\'s")\n'
+        f"def given(run):\n    {body}\n"
+    )
+
+
+def cost_text(name: str, body: str) -> str:
+    """Return a file with one cost of this body, 9 for a failed run."""
+    return (
+        f'import hil\n\n\n@hil.tuning_cost("{name}", meaning="a test\'s", failed=9.0)\n'
+        f"def given(figures):\n    {body}\n"
+    )

@@ -51,6 +51,19 @@ def test_figures_in_pieces_are_those_of_the_whole(run, tmp_path, monkeypatch, ro
     assert sum(math.isfinite(value) for value in whole.values()) > 20
 
 
+@pytest.mark.parametrize("count", [1, 2, 5, 6, 301])
+@pytest.mark.parametrize("special", [None, math.inf, -0.0, math.nan])
+def test_medians_of_a_piece_are_those_of_numpy(count, special):
+    """Bit for bit, in one array or in two; unknown where one value is."""
+    values = np.round(np.random.default_rng(count).normal(size=count), 1)
+    values[count // 2] = values[count // 2] if special is None else special
+    expected = np.float64(np.median(values)).tobytes()
+    for parts in ([values], [values[:1], values[1:]]):
+        found = np.float64(pieces.median(lambda parts=parts: iter(parts)))
+        assert found.tobytes() == expected or np.isnan([found, np.median(values)]).all()
+    assert math.isnan(pieces.median(lambda: iter([np.empty(0)])))
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_percentiles_of_pieces_are_those_of_numpy(monkeypatch, seed):
     """Bit for bit: of either sign, of equal values, of zeros with signs, with some unknown."""

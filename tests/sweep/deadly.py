@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Sequence
 from pathlib import Path
 
 
@@ -31,3 +32,15 @@ def dies_on_three(job: int) -> int:
     if job == 3:
         os.kill(os.getpid(), signal.SIGKILL)
     return job * job
+
+
+class Counts:
+    """Returns each job with how many were done side by side."""
+
+    def __call__(self, job: int) -> tuple[int, int]:
+        """Return it alone."""
+        return self.many([job])[0]
+
+    def many(self, jobs: Sequence[int]) -> list[tuple[int, int]]:
+        """Return them."""
+        return [(job, len(jobs)) for job in jobs]

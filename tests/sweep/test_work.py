@@ -21,8 +21,8 @@ from hil.study.campaign.maps import write_page
 from hil.study.campaign.plan import Campaign, load_campaign
 from hil.study.campaign.results import ResultStore, program, programs
 from hil.study.campaign.work import Worker, run_campaign
-from hil.study.campaign.workers import in_processes
-from tests.sweep.deadly import DiesOnce, always_dies, dies_on_three
+from hil.study.campaign.workers import Pool, in_processes
+from tests.sweep.deadly import Counts, DiesOnce, always_dies, dies_on_three
 
 TEXT = """
 scenario = "scenario-1"
@@ -93,6 +93,17 @@ def test_cluster_gives_the_same_file(campaign: Campaign, finished: Path, tmp_pat
     assert other == (finished / "results.parquet").read_bytes()
 
 
+def test_groups_of_any_size_give_the_same_file(
+    campaign: Campaign, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Runs one by one, and all of them side by side, byte for byte."""
+    for size in (1, 5):
+        monkeypatch.setattr("hil.study.workers.SIDE_BY_SIDE", size)
+        run_campaign(campaign, tmp_path / str(size), workers=1)
+        other = (tmp_path / str(size) / "results.parquet").read_bytes()
+        assert other == (finished / "results.parquet").read_bytes()
+
+
 def test_cluster_that_is_not_there_is_one_line() -> None:
     """An address that makes no sense is bad input."""
     pytest.importorskip("distributed")
@@ -122,6 +133,26 @@ def test_job_that_kills_its_worker_costs_only_itself() -> None:
     assert sorted(item for item in results if item not in lost) == [0, 1, 4, 16, 25, 36, 49]
 
 
+def test_job_that_kills_its_worker_costs_only_itself_in_a_group() -> None:
+    """The jobs of its group are done again, one by one."""
+    work = in_processes(dies_on_three, range(8), 2, lambda job, reason: (job, reason), 4)
+    results = [item for item in work if not isinstance(item, tuple)]
+    assert sorted(results) == [0, 1, 4, 16, 25, 36, 49]
+
+
+def test_jobs_in_groups_are_done_side_by_side_in_their_order() -> None:
+    """A function that does many has them in one call; a list of results has the order of its jobs."""
+    told: list[tuple[int, tuple[int, int]]] = []
+    with Pool(Counts(), 2) as pool:
+        found = pool.map(range(13), lambda place, result: told.append((place, result)))
+    assert [job for job, _ in found] == list(range(13))
+    assert [together for _, together in found] == [2] * 12 + [1]
+    assert sorted(told) == list(enumerate(found))
+    alone = in_processes(Counts(), range(3), 1)
+    assert sorted(alone) == [(0, 1), (1, 1), (2, 1)]
+    assert sorted(in_processes(Counts(), range(3), 1, side_by_side=3)) == [(0, 3), (1, 3), (2, 3)]
+
+
 def test_workers_that_die_whatever_the_job_end_the_campaign() -> None:
     """Not a campaign of lost runs: after three in a row it is said."""
     with pytest.raises(RigFault, match="3 runs one after the other"):
@@ -134,11 +165,11 @@ def test_one_bad_run_is_a_row_and_is_tried_again(
     """An error of the program names type, text and line; going on runs that row alone."""
     job = campaign.jobs()[5]
 
-    def fails(_spec: RunSpec) -> None:
+    def fails(*_parts: object) -> None:
         raise ZeroDivisionError("of two")
 
     with monkeypatch.context() as patch:
-        patch.setattr("hil.runs.execute.execute_in_memory", fails)
+        patch.setattr("hil.runs.execute.make_parts", fails)
         row = Worker(campaign)(job).row
     assert row["outcome"] == "error"
     assert row["detail"].startswith("ZeroDivisionError: of two (test_work.py:")

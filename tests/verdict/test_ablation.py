@@ -1,6 +1,7 @@
 """Parts of a law switched off: which there are, that they are off, and that a part that works is seen."""
 
 import json
+from functools import partial
 
 import pytest
 from click.testing import CliRunner
@@ -13,8 +14,9 @@ from hil.control.laws.parts import WithoutFeedForward, WithoutGamma, WithoutKapp
 from hil.core.errors import BadInput
 from hil.core.registries import OUTER_LAWS
 from hil.core.types import ReferenceState
+from hil.runs.together import figures_together
 from hil.study.ablation import ablate
-from hil.study.parts_off import parts_of, run_without
+from hil.study.parts_off import opened_without, parts_of
 from hil.study.suite import KEPT, Job, Yardstick
 
 
@@ -86,11 +88,13 @@ def test_without_feed_forward_the_law_sees_a_reference_at_rest():
 def test_nothing_off_is_the_law_itself_and_a_part_off_is_not():
     """The same figures as a plain run; without feed-forward the circle is tracked worse."""
     scenario = load_scenario("circle-fast", ["duration_s=5"])
-    whole, again, off = (run_without(scenario, "pid", 3, part) for part in ("", "", "feed-forward"))
+    whole, again, off = figures_together(
+        [partial(opened_without, scenario, "pid", 3, part) for part in ("", "", "feed-forward")]
+    )
     assert whole == pytest.approx(again, nan_ok=True)
     assert off["iae_m_s"] > 1.5 * whole["iae_m_s"]
     with pytest.raises(BadInput, match="has no part 'alpha' to switch off"):
-        run_without(scenario, "pid", 3, "alpha")
+        opened_without(scenario, "pid", 3, "alpha")
 
 
 def test_a_part_that_helps_everywhere_is_found_and_one_that_does_nothing_is_not():

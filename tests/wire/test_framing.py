@@ -8,7 +8,7 @@ from fastcrc.crc16 import mcrf4xx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hil.wire import dialect
+from hil.wire import _wire, dialect
 from hil.wire.framing import FrameReader, FrameWriter
 
 F32 = st.floats(width=32, allow_nan=False)
@@ -161,3 +161,26 @@ def test_any_payload_of_any_message_raises_nothing(msg_id, payload, seq):
     crc = mcrf4xx(body + bytes((message.crc_extra,)))
     ((got, _, _),) = FrameReader().feed(b"\xfd" + body + crc.to_bytes(2, "little"))
     assert got == msg_id
+
+
+@given(st.integers(0, 2**15 - 1), U8)
+def test_a_request_for_a_parameter_is_as_pymavlink_packs_it(index, frames_before):
+    """Byte for byte, zeros cut off, and it counts as a frame."""
+    native = FrameWriter()._native
+    for _ in range(frames_before):
+        native.count()
+    mavlink = dialect.MAVLink(None, 255, 190)
+    mavlink.seq = frames_before
+    message = dialect.MAVLink_param_request_read_message(1, 1, b"", index)
+    assert native.parameter_request(index) == bytes(message.pack(mavlink))
+    assert native.seq == (frames_before + 1) & 0xFF
+
+
+@given(st.binary(min_size=0, max_size=16), F32, U16, U16)
+def test_a_parameter_is_decoded_as_pymavlink_does(name, value, count, index):
+    """Its name up to a zero, whatever its bytes are; value, count and index."""
+    message = dialect.MAVLink_param_value_message(name, value, 9, count, index)
+    frame = board_frames(message)
+    slow = dialect.MAVLink(None).decode(bytearray(frame))
+    fields = (slow.param_id, slow.param_value, slow.param_count, slow.param_index)
+    assert _wire.parameter(frame) == fields

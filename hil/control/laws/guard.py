@@ -9,8 +9,8 @@ the board's own time-out (250 ms without a set-point) stops the robot.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -30,7 +30,7 @@ Result = TypeVar("Result")
 # Longest that one call of the law may take, s: the board gives up on the host after 0.25 s.
 STEP_MAX_S = 0.2
 # Set-points this far over a limit are a fault; less is rounding.
-_EXCESS = 1.0 + 1e-9
+EXCESS = 1.0 + 1e-9
 
 
 class GuardedLaw:
@@ -38,61 +38,90 @@ class GuardedLaw:
 
     def __init__(self, entry: Entry, make: Callable[[], OuterLaw], limits: OuterLimits) -> None:
         self._entry = entry
-        self._limits = limits
-        self._law = self._call("making it", make)
+        self.limits = limits
+        self._law = self.call("making it", make)
 
     def reset(self, reference: ReferenceState, estimate: Estimate) -> None:
         """Start anew from this estimate; raises RigFault."""
-        self._call("reset", lambda: self._law.reset(reference, estimate))
+        self.call("reset", lambda: self._law.reset(reference, estimate))
 
     def step(self, reference: ReferenceState, estimate: Estimate, dt_s: float) -> OuterCommand:
         """Return the law's command; raises RigFault when it is none that may be sent."""
-        command = self._call("step", lambda: self._law.step(reference, estimate, dt_s))
+        command = self.call("step", lambda: self._law.step(reference, estimate, dt_s))
         if not isinstance(command, OuterCommand):
-            raise self._fault(f"step returned {type(command).__name__}, an OuterCommand is needed")
-        self._check("eta1_m_s", command.eta1_m_s, self._limits.eta1_max_m_s, "m/s")
-        self._check(
-            "theta_dot_rad_s", command.theta_dot_rad_s, self._limits.theta_dot_max_rad_s, "rad/s"
-        )
+            raise self.fault(f"step returned {type(command).__name__}, an OuterCommand is needed")
+        self._check_speeds(command.eta1_m_s, command.theta_dot_rad_s, "step")
         self._check_trace(command.trace)
         if type(command.eta1_m_s) is float and type(command.theta_dot_rad_s) is float:
             return command
         # As 64 bits from here on, whatever the law calculates in: what follows is then the same everywhere.
         return OuterCommand(float(command.eta1_m_s), float(command.theta_dot_rad_s), command.trace)
 
+    @property
+    def makes_batches(self) -> bool:
+        """Say whether the law's class can step several runs at once (hil.core.batch)."""
+        return callable(getattr(type(self._law), "batch", None))
+
+    @property
+    def batch_key(self) -> tuple[int, Callable[..., object]]:
+        """Return what laws that are stepped together have equal."""
+        made: Callable[..., object] = type(self._law)
+        return id(self._entry), made
+
+    def batch_of(self, laws: Sequence[GuardedLaw]) -> Any:
+        """Return what steps the runs of several laws, this one among them."""
+        made: Any = type(self._law)
+        return made.batch([law._law for law in laws])
+
+    def refused(self, eta1_m_s: float, theta_dot_rad_s: float, said: str) -> RigFault | None:
+        """Return why these speeds that `said` returned may not be sent, None where they may."""
+        try:
+            self._check_speeds(eta1_m_s, theta_dot_rad_s, said)
+        except RigFault as fault:
+            return fault
+        return None
+
+    def _check_speeds(self, eta1_m_s: float, theta_dot_rad_s: float, said: str) -> None:
+        limits = self.limits
+        self._check(said, "eta1_m_s", eta1_m_s, limits.eta1_max_m_s, "m/s")
+        self._check(said, "theta_dot_rad_s", theta_dot_rad_s, limits.theta_dot_max_rad_s, "rad/s")
+
     def _check_trace(self, trace: object) -> None:
         """Refuse a trace that the record could not hold; NaN stands for "does not exist"."""
         if not isinstance(trace, Mapping):
-            raise self._fault(f"step returned a trace that is {type(trace).__name__}, not a dict")
+            raise self.fault(f"step returned a trace that is {type(trace).__name__}, not a dict")
         for name, value in trace.items():
             if not isinstance(value, int | float | np.number | np.bool_):
-                raise self._fault(f"step returned trace[{name!r}] = {value!r}, not a number")
+                raise self.fault(f"step returned trace[{name!r}] = {value!r}, not a number")
 
-    def _check(self, name: str, value: float, limit: float, unit: str) -> None:
+    def _check(self, said: str, name: str, value: float, limit: float, unit: str) -> None:
         try:
             finite = math.isfinite(value)
         except TypeError:
-            raise self._fault(f"step returned {name} = {value!r}, a number is needed") from None
+            raise self.fault(f"{said} returned {name} = {value!r}, a number is needed") from None
         if not finite:
-            raise self._fault(f"step returned {name} = {value}")
-        if abs(value) > limit * _EXCESS:
-            raise self._fault(
-                f"step asked for {name} = {past(value, math.copysign(limit, value), '.6g')} {unit}, "
+            raise self.fault(f"{said} returned {name} = {value}")
+        if abs(value) > limit * EXCESS:
+            raise self.fault(
+                f"{said} asked for {name} = {past(value, math.copysign(limit, value), '.6g')} {unit}, "
                 f"the limit is {limit:g} {unit}"
             )
 
-    def _call(self, what: str, function: Callable[[], Result]) -> Result:
+    def call(self, what: str, function: Callable[[], Result], runs: int = 1) -> Result:
+        """Return what a call of the law for so many runs gives; raises RigFault where it raises or hangs."""
         try:
-            with time_limit(STEP_MAX_S):
+            with time_limit(STEP_MAX_S * runs):
                 return function()
         except HilError:
             raise
         except TooLongError as error:
-            raise self._fault(f"{what} took longer than {STEP_MAX_S:g} s", error) from None
+            limit_s = STEP_MAX_S * runs
+            raise self.fault(f"{what} took longer than {limit_s:g} s", error) from None
         except (KeyboardInterrupt, SystemExit):
             raise
         except BaseException as error:
-            raise self._fault(f"{what} raised {in_one_line(error)}", error) from None
+            raise self.fault(f"{what} raised {in_one_line(error)}", error) from None
 
-    def _fault(self, said: str, error: BaseException | None = None) -> RigFault:
+    def fault(self, said: str, error: BaseException | None = None) -> RigFault:
+        """Return the fault that names the law, its file and its line."""
         return RigFault(f"law {self._entry.name} ({place_of(self._entry, error)}): {said}")

@@ -2,7 +2,9 @@
 // from the board, poses of a camera that gives them itself or its pictures, a clock. Times are host times in s.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <string>
 
 namespace core {
@@ -31,6 +33,18 @@ class SimulatedRig {
   virtual double now_s() const = 0;
   // Returns at until_s, or as soon as bytes or a frame have arrived.
   virtual void wait(double until_s) = 0;
+  // The same in halves, so that several rigs can be moved on side by side: `move` goes towards the next arrival,
+  // `arrived` tells whether the wait is over; where it is not, move again.
+  virtual void move(double until_s) = 0;
+  virtual bool arrived(double until_s) = 0;
+  // A wait of one rig of several; `failed` is what its move threw.
+  struct Wait {
+    SimulatedRig* rig;
+    double until_s;
+    std::exception_ptr failed;
+  };
+  // Moves several rigs of this one's kind, as `move` does one by one.
+  virtual void move_together(Wait* waits, std::size_t count) = 0;
   // Every byte that has arrived by now.
   virtual std::string read() = 0;
   // Sends the bytes towards the board; throws RigFault when the port is full.

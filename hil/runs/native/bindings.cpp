@@ -345,6 +345,12 @@ void bind_pump(nb::module_& m) {
           [](Pump& p, double until_s, bool busy) { return static_cast<int>(p.begin(until_s, busy)); },
           "until_s"_a, "busy"_a)
       .def(
+          "begin_periods",
+          [](Pump& p, double period_s, double last_s) {
+            return static_cast<int>(p.begin_periods(period_s, last_s));
+          },
+          "period_s"_a, "last_s"_a)
+      .def(
           "go_on", [](Pump& p, bool busy) { return static_cast<int>(p.go_on(busy)); }, "busy"_a)
       .def_prop_ro("now_s", &Pump::now_s)
       .def("others", &others_of)
@@ -384,7 +390,8 @@ void bind_pump(nb::module_& m) {
 
 }  // namespace
 
-void bind_drive(nb::module_& m);  // drive_bind.cpp
+void bind_drive(nb::module_& m);     // drive_bind.cpp
+void bind_together(nb::module_& m);  // together_bind.cpp
 
 NB_MODULE(_native, m) {
   nb::set_leak_warnings(false);  // values held by a test session at exit are no leak
@@ -396,4 +403,5 @@ NB_MODULE(_native, m) {
   bind_watch(m);
   bind_pump(m);
   bind_drive(m);
+  bind_together(m);
 }

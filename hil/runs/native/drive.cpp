@@ -1,5 +1,7 @@
 #include "drive.hpp"
 
+#include "answered_law.hpp"
+
 namespace runs {
 namespace {
 
@@ -11,27 +13,44 @@ outer::Vec2 paired(const std::array<double, 2>& v) { return {v[0], v[1]}; }
 
 }  // namespace
 
-Drive::Stop Drive::run(bool busy, bool refused, const BoardLimits& board) {
+Drive::Stop Drive::go(bool busy, bool refused, const BoardLimits& board, bool apart) {
   for (int since = 0; since < kPause; ++since) {
-    const Pump::Stop stop = under_way_ ? pump_.go_on(busy) : pump_.begin(due_s(), busy);
-    under_way_ = stop != Pump::kReached;
-    if (under_way_) return stop == Pump::kHeard ? kHeard : kTaken;
-    reached_s_ = pump_.now_s();
-    if (!tick(refused, board)) return kAsked;
+    if (!begun_) {
+      const Pump::Stop stop = under_way_ ? pump_.go_on(busy, apart) : pump_.begin(due_s(), busy, apart);
+      under_way_ = stop != Pump::kReached;
+      if (under_way_) return stop == Pump::kHeard ? kHeard : stop == Pump::kTaken ? kTaken : kAway;
+      reached_s_ = pump_.now_s();
+      begun_ = begin_tick(refused, board);
+      if (!begun_) return kAsked;
+    }
+    if (!ask()) return kLaw;
+    begun_ = false;
+    act();
     if (++tick_ == plan_.ticks) return kDone;
   }
   return kPaused;
 }
 
-bool Drive::tick(bool refused, const BoardLimits& board) {
-  const double now_s = pump_.rig_now_s();
+// What a tick does before its law is asked; false where the robot has to be stopped.
+bool Drive::begin_tick(bool refused, const BoardLimits& board) {
+  now_s_ = pump_.rig_now_s();
   if (refused || pump_.link().state != HIL_STATE_ARMED) return false;
-  watch_.supervisor.check_host(now_s);
-  watch_.check(now_s, pump_.agreement(now_s), board.top_counts);
-  const outer::Estimate estimate = look(now_s, board);
-  const outer::ReferenceState reference = reference_.at(estimate.t_host_s - plan_.t0_s);
-  if (tick_ == 0) law_.reset(reference, estimate);
-  act(now_s, reference, law_.step(reference, estimate, plan_.period_s));
+  watch_.supervisor.check_host(now_s_);
+  watch_.check(now_s_, pump_.agreement(now_s_), board.top_counts);
+  estimate_ = look(now_s_, board);
+  wanted_ = reference_.at(estimate_.t_host_s - plan_.t0_s);
+  return true;
+}
+
+// Asks the law; false where its answer has to be worked out by others first.
+bool Drive::ask() {
+  try {
+    if (!reset_) law_.reset(wanted_, estimate_);
+    reset_ = true;
+    command_ = law_.step(wanted_, estimate_, plan_.period_s);
+  } catch (const outer::AnswerWanted&) {
+    return false;
+  }
   return true;
 }
 
@@ -49,19 +68,19 @@ outer::Estimate Drive::look(double now_s, const BoardLimits& board) {
   return out;
 }
 
-void Drive::act(double now_s, const outer::ReferenceState& reference, const outer::OuterCommand& command) {
-  const double t_s = now_s - plan_.t0_s;
-  const bool late = now_s - due_s() > kLate * plan_.period_s;
-  const auto [left, right] = geometry_.wheels(command.eta1_m_s, command.theta_dot_rad_s);
-  const Command asked{command.eta1_m_s, command.theta_dot_rad_s, left, right};
-  const auto goal = listed(reference_.at(t_s).z1_m), aim = listed(reference.z1_m);
-  pump_.act(now_s, plan_.period_s, asked, aim[0], aim[1]);
-  const auto estimate = pump_.estimate(now_s);
+void Drive::act() {
+  const double t_s = now_s_ - plan_.t0_s;
+  const bool late = now_s_ - due_s() > kLate * plan_.period_s;
+  const auto [left, right] = geometry_.wheels(command_.eta1_m_s, command_.theta_dot_rad_s);
+  const Command asked{command_.eta1_m_s, command_.theta_dot_rad_s, left, right};
+  const auto goal = listed(reference_.at(t_s).z1_m), aim = listed(wanted_.z1_m);
+  pump_.act(now_s_, plan_.period_s, asked, aim[0], aim[1]);
+  const auto estimate = pump_.estimate(now_s_);
   const Motion truth = pump_.truth();
   watch_.row(
-      now_s, t_s, estimate ? &*estimate : nullptr, &truth, goal[0], goal[1], asked, pump_.link(), late,
-      [this](double value) { rows.push_back(value); }, [&](auto) { put_terms(common_, command.trace); });
-  put_terms(own_, command.trace);
+      now_s_, t_s, estimate ? &*estimate : nullptr, &truth, goal[0], goal[1], asked, pump_.link(), late,
+      [this](double value) { rows.push_back(value); }, [&](auto) { put_terms(common_, command_.trace); });
+  put_terms(own_, command_.trace);
 }
 
 void Drive::put_terms(const Keys& keys, const outer::Trace& trace) {

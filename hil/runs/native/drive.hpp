@@ -23,7 +23,8 @@ struct BoardLimits {
 class Drive {
  public:
   // kAsked: the host has to stop the robot; who asks again is told why.
-  enum Stop { kDone, kHeard, kTaken, kPaused, kAsked };
+  // Of a part alone: kAway, its rig has to be moved on; kLaw, others have to answer for its law.
+  enum Stop { kDone, kHeard, kTaken, kPaused, kAsked, kAway, kLaw };
   using Keys = std::vector<int>;  // places in a law's trace, -1 for what it does not have
 
   Drive(Pump& pump, Watch& watch, outer::OuterLaw& law, outer::Reference& reference,
@@ -32,7 +33,10 @@ class Drive {
         common_(std::move(common)), own_(std::move(own)) {}
 
   // Goes on until Python is needed; `busy` is that of Pump, `refused` that the board refused a set-point.
-  Stop run(bool busy, bool refused, const BoardLimits& board);
+  Stop run(bool busy, bool refused, const BoardLimits& board) { return go(busy, refused, board, false); }
+  // The same up to what several runs have done for them side by side (together.hpp).
+  Stop part(bool busy, bool refused, const BoardLimits& board) { return go(busy, refused, board, true); }
+  Pump& pump() { return pump_; }
 
   double reached_s() const { return reached_s_; }  // time of the last arrival that was waited for
   std::vector<double> rows;                        // of ticks, not yet taken
@@ -41,9 +45,11 @@ class Drive {
   static constexpr int kPause = 256;  // ticks after which Python may see to signals and threads
 
   double due_s() const { return plan_.t0_s + static_cast<double>(tick_) * plan_.period_s; }
-  bool tick(bool refused, const BoardLimits& board);
+  Stop go(bool busy, bool refused, const BoardLimits& board, bool apart);
+  bool begin_tick(bool refused, const BoardLimits& board);
+  bool ask();
   outer::Estimate look(double now_s, const BoardLimits& board);
-  void act(double now_s, const outer::ReferenceState& reference, const outer::OuterCommand& command);
+  void act();
   void put_terms(const Keys& keys, const outer::Trace& trace);
 
   Pump& pump_;
@@ -55,6 +61,12 @@ class Drive {
   Keys common_, own_;
   std::int64_t tick_ = 0;
   bool under_way_ = false;  // the wait for the next tick
+  bool begun_ = false;      // the tick: the law is to be asked
+  bool reset_ = false;      // the law was
+  double now_s_ = 0.0;      // of the tick
+  outer::Estimate estimate_;
+  outer::ReferenceState wanted_;
+  outer::OuterCommand command_{};
   double reached_s_ = -kInfinite;
 };
 

@@ -12,16 +12,32 @@ std::string odd_stamp(double ahead_s) {
   return "stamped earlier than a frame before it, or not at all";
 }
 
-Pump::Stop Pump::begin(double until_s, bool busy) {
+Pump::Stop Pump::begin(double until_s, bool busy, bool apart) {
   until_s_ = until_s;
+  last_s_ = -kInfinite;
   waited_ = false;
   stage_ = kLook;
-  return run(busy);
+  return run(busy, apart);
 }
 
-Pump::Stop Pump::go_on(bool busy) { return run(busy); }
+Pump::Stop Pump::begin_periods(double period_s, double last_s) {
+  period_s_ = period_s;
+  last_s_ = last_s;
+  stage_ = kLook;
+  return next_period() ? run(true, false) : kReached;
+}
 
-Pump::Stop Pump::run(bool busy) {
+bool Pump::next_period() {
+  const double now_s = rig_.now_s();
+  if (now_s >= last_s_) return false;
+  until_s_ = std::min(last_s_, now_s + period_s_);
+  waited_ = false;
+  return true;
+}
+
+Pump::Stop Pump::go_on(bool busy, bool apart) { return run(busy, apart); }
+
+Pump::Stop Pump::run(bool busy, bool apart) {
   while (true) {
     if (stage_ == kLook) {
       now_s_ = rig_.now_s();
@@ -30,7 +46,7 @@ Pump::Stop Pump::run(bool busy) {
       reports_.clear();
       stage_ = kTake;
       take_bytes();
-      if (busy || !others.empty()) return kHeard;
+      if ((busy && link_.rested(now_s_)) || !others.empty()) return kHeard;
     }
     if (stage_ == kTake) {
       stage_ = kWait;
@@ -42,13 +58,18 @@ Pump::Stop Pump::run(bool busy) {
       while (rig_.take_frame(frame)) take_frame(frame);
       if (!others.empty()) return kTaken;
     }
+    const bool over = now_s_ >= until_s_;
+    if (stage_ == kWait && !(over && waited_)) {
+      stage_ = over ? kOver : kLook;
+      waited_ = true;
+      away_until_s_ = over ? now_s_ : until_s_;
+      if (apart) return kAway;
+      rig_.wait(away_until_s_);
+    }
+    if (stage_ == kLook) continue;
     stage_ = kLook;
-    if (now_s_ >= until_s_) break;
-    rig_.wait(until_s_);
-    waited_ = true;
+    if (!busy || !next_period()) return kReached;
   }
-  if (!waited_) rig_.wait(now_s_);
-  return kReached;
 }
 
 void Pump::take_bytes() {

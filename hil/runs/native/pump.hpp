@@ -40,7 +40,7 @@ using Eye = std::function<Seen(const std::optional<estimator::State>& expected)>
 
 class Pump {
  public:
-  enum Stop { kReached, kHeard, kTaken };
+  enum Stop { kReached, kHeard, kTaken, kAway };
 
   Pump(core::SimulatedRig& rig, wire::Link& link, core::CameraClock& camera, estimator::Fused& fused,
        Watch& watch, Note note, Eye eye)
@@ -48,10 +48,15 @@ class Pump {
         eye_(std::move(eye)) {}
 
   // Takes what arrives until until_s, and waits once at least. Stops on the way where messages wait in
-  // `others`, or after each arrival's bytes where a procedure is under way (`busy`): kHeard before, kTaken
-  // after reports and frames were taken.
-  Stop begin(double until_s, bool busy);
-  Stop go_on(bool busy);
+  // `others`, or after the bytes of an arrival that the procedure under way (`busy`) may look at, or whose
+  // time-out has come: kHeard before, kTaken after reports and frames were taken. `apart`: kAway instead of a
+  // wait, for who moves the rig on until away_until_s.
+  Stop begin(double until_s, bool busy, bool apart = false);
+  // The same period after period until last_s, for as long as the procedure under way is not done.
+  Stop begin_periods(double period_s, double last_s);
+  Stop go_on(bool busy, bool apart = false);
+  core::SimulatedRig& rig() { return rig_; }
+  double away_until_s() const { return away_until_s_; }
 
   double now_s() const { return now_s_; }
   const wire::Link& link() const { return link_; }
@@ -83,9 +88,10 @@ class Pump {
   std::vector<FrameRow> frames;
 
  private:
-  enum Stage { kLook, kTake, kWait };
+  enum Stage { kLook, kTake, kWait, kOver };
 
-  Stop run(bool busy);
+  Stop run(bool busy, bool apart);
+  bool next_period();
   void take_bytes();
   void take_frame(const core::PoseFrame& frame);
 
@@ -97,7 +103,8 @@ class Pump {
   Note note_;
   Eye eye_;
   Stage stage_ = kLook;
-  double until_s_ = 0.0, now_s_ = 0.0;
+  double until_s_ = 0.0, now_s_ = 0.0, away_until_s_ = 0.0;
+  double period_s_ = 0.0, last_s_ = -kInfinite;  // of begin_periods
   bool waited_ = false;
   std::int64_t restarts_ = 0;
   std::vector<wire::WheelReport> reports_;

@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 
 from hil.core.errors import BadInput, RigFault
 from hil.study.campaign.workers import AHEAD, MOST_LOST, Waiting
+from hil.study.workers import OfGroups, groups_of
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -41,8 +42,11 @@ def on_dask(
     lost: Callable[[Job, str], Result] | None = None,
     say: Callable[[str], None] = lambda _text: None,
     needed: Sequence[str] = PROGRAM,
+    side_by_side: int = 1,
 ) -> Iterator[Result]:
     """Yield the results of all jobs from the cluster whose scheduler is at `address`.
+
+    They go to its workers in groups of `side_by_side`; those of a group that was lost go one by one.
 
     `lost` makes a job's result of it and the reason when each worker that took it died; `say` is
     told what is waited for; `needed` are the modules that a worker must be able to import. Raises
@@ -65,7 +69,7 @@ def on_dask(
             raise BadInput(f"--dask {address}: no scheduler answers there ({error})") from None
         crew = _Crew(dask, client, address, say, f"import {', '.join(needed)}")
         try:
-            yield from crew.do(function, Waiting(jobs), lost)
+            yield from crew.do(OfGroups(function), Waiting(groups_of(jobs, side_by_side)), lost)
         finally:
             with suppress(Exception):  # the scheduler may be gone: nothing is left to be told
                 client.close(timeout=2)
@@ -99,15 +103,15 @@ class _Crew:
 
     def do(
         self,
-        function: Callable[[Job], Result],
-        todo: Waiting[Job],
+        function: OfGroups[Job, Result],
+        todo: Waiting[tuple[Job, ...]],
         lost: Callable[[Job, str], Result] | None,
     ) -> Iterator[Result]:
-        """Yield results as they come, with some jobs ahead for each thread of the cluster.
+        """Yield results as they come, with some groups of jobs ahead for each thread of the cluster.
 
         Raises RigFault when the cluster goes away.
         """
-        pending: dict[Any, Job] = {}
+        pending: dict[Any, tuple[Job, ...]] = {}
         lost_in_a_row = 0
         while todo or pending:
             most = AHEAD * max(1, self._look())
@@ -116,12 +120,19 @@ class _Crew:
                 future = self._asked(self._client.submit, function, todo.first, pure=False)
                 pending[future] = todo.popleft()
             for future in self._done(list(pending)):
-                job = pending.pop(future)
-                result, reason = self._result(future)
-                if reason and (lost is None or lost_in_a_row + 1 >= MOST_LOST):
-                    raise RigFault(f"--dask {self._address}: job {job}: {reason}; {_KEPT}")
-                lost_in_a_row = lost_in_a_row + 1 if reason else 0
-                yield lost(job, reason) if reason and lost else result
+                group = pending.pop(future)
+                results, reason = self._result(future)
+                if not reason:
+                    lost_in_a_row = 0
+                    yield from results
+                elif len(group) > 1:
+                    for job in group[::-1]:
+                        todo.appendleft((job,))
+                elif lost is None or lost_in_a_row + 1 >= MOST_LOST:
+                    raise RigFault(f"--dask {self._address}: job {group[0]}: {reason}; {_KEPT}")
+                else:
+                    lost_in_a_row += 1
+                    yield lost(group[0], reason)
 
     def _look(self) -> int:
         """Return the cluster's threads; says so when there are none, and gives up after a while."""

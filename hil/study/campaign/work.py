@@ -1,4 +1,4 @@
-"""Does the jobs of a campaign: one run in memory each, and the loop that hands them out."""
+"""Does the jobs of a campaign: runs in memory, side by side, and the loop that hands them out."""
 
 from __future__ import annotations
 
@@ -19,9 +19,13 @@ from hil.study.campaign.plan import Campaign, Job
 from hil.study.campaign.results import CAMPAIGN, ERROR, ResultStore, Row, row_of
 from hil.study.campaign.workers import in_processes
 from hil.study.work_folder import LOCK, is_new, sigterm_stops, sole_writer
+from hil.study.workers import group_size
 
 if TYPE_CHECKING:
     from hil.config.scenario import Scenario
+    from hil.record.reader import RunRecord
+    from hil.runs.spec import RunSpec
+    from hil.runs.together import Result
     from hil.study.campaign.merge import Results
 
 Progress = Callable[[int, int], None]
@@ -62,15 +66,47 @@ class Worker:
 
     def __call__(self, job: Job) -> Done:
         """Run the job; a run that ends early has no figures."""
+        return self.many([job])[0]
+
+    def many(self, jobs: Sequence[Job]) -> list[Done]:
+        """Run the jobs side by side."""
         start_s = time.perf_counter()
-        row = run_job(self._campaign, job)
-        return Done(row, time.perf_counter() - start_s)
+        rows = run_jobs(self._campaign, jobs)
+        busy_s = (time.perf_counter() - start_s) / len(jobs)
+        return [Done(row, busy_s) for row in rows]
 
 
-def run_job(campaign: Campaign, job: Job) -> Row:
-    """Run one job in memory and return its row; whatever one run does is its row's outcome."""
+def run_jobs(campaign: Campaign, jobs: Sequence[Job]) -> list[Row]:
+    """Run jobs in memory, side by side, and return their rows; whatever a run does is its row's outcome."""
+    from hil.runs.together import execute_together  # noqa: PLC0415 - in the worker only
+
+    specs = [_spec(campaign, job) for job in jobs]
+    found = iter(execute_together([spec for spec in specs if not isinstance(spec, Exception)]))
+    made = [spec if isinstance(spec, Exception) else next(found) for spec in specs]
+    return [_row(job, result) for job, result in zip(jobs, made, strict=True)]
+
+
+def _spec(campaign: Campaign, job: Job) -> RunSpec | Exception:
+    """Return what is to be run, or why it cannot be."""
+    from hil.runs.spec import RunSpec  # noqa: PLC0415 - in the worker only
+
+    file = campaign.file
     try:
-        return _run(campaign, job)
+        scenario = _scenario(campaign, job.point)
+        check_fit(scenario)
+        return RunSpec(
+            scenario, file.target, file.camera, job.outer, job.inner, job.seed, Path(),
+            rerun=False, command="hil sweep",
+        )  # fmt: skip
+    except Exception as error:
+        return error
+
+
+def _row(job: Job, made: Result) -> Row:
+    try:
+        if isinstance(made, BaseException):
+            raise made
+        return _row_of_run(job, made)
     except BadInput as error:  # a combination of values, each of them allowed by itself
         return row_of(job, "refused", str(error), False, 0.0, [])
     except RigFault:  # the target cannot be had on this machine, for no job
@@ -79,21 +115,8 @@ def run_job(campaign: Campaign, job: Job) -> Row:
         return row_of(job, ERROR, _where(error), False, 0.0, [])
 
 
-def _run(campaign: Campaign, job: Job) -> Row:
-    from hil.runs.execute import RunSpec, execute_in_memory  # noqa: PLC0415 - in the worker only
-
-    scenario = _scenario(campaign, job.point)
-    check_fit(scenario)
-    file = campaign.file
-    record = execute_in_memory(
-        RunSpec(
-            scenario, file.target, file.camera, job.outer, job.inner, job.seed, Path(),
-            rerun=False, command="hil sweep",
-        )
-    )  # fmt: skip
+def _row_of_run(job: Job, record: RunRecord) -> Row:
     manifest, t_s = record.manifest, record.samples["t_s"]
-    if manifest.outcome == "interrupted":
-        raise KeyboardInterrupt
     end_s = float(t_s[-1]) if t_s.size else 0.0
     if manifest.outcome != "complete":
         return row_of(job, manifest.outcome, manifest.outcome_detail, False, end_s, [])
@@ -149,6 +172,11 @@ def run_campaign(
         return _go_on(ResultStore(folder, campaign), campaign, workers, dask, progress, say)
 
 
+def _group(campaign: Campaign, jobs: int, workers: int) -> int:
+    """Return how many jobs go to a worker at once: runs with poses; pictures are drawn for one at a time."""
+    return group_size(Worker, jobs, workers) if campaign.file.camera == "pose" else 1
+
+
 def _go_on(
     store: ResultStore,
     campaign: Campaign,
@@ -161,6 +189,7 @@ def _go_on(
         say(note)
     jobs = campaign.jobs()
     before = int(store.done.sum())
+    left = len(jobs) - before
     todo = (jobs[index] for index in np.flatnonzero(~store.done).tolist())
     count = workers or os.cpu_count() or 1
     worker = Worker(campaign)
@@ -168,14 +197,15 @@ def _go_on(
     results: Iterator[Done]
     native = ("sim_twin._pil",) if campaign.file.target == "pil" else ()
     if dask:
-        results = on_dask(worker, todo, dask, _lost, say, (*PROGRAM, *native))
+        needed = (*PROGRAM, *native)
+        results = on_dask(worker, todo, dask, _lost, say, needed, _group(campaign, left, count))
     else:
         if native:  # said once here; else each run would be refused for it
             from sim_twin.pil import pil_is_missing  # noqa: PLC0415 - for this target only
 
             if missing := pil_is_missing():
                 raise BadInput(missing)
-        results = in_processes(worker, todo, count, _lost)
+        results = in_processes(worker, todo, count, _lost, _group(campaign, left, count))
     busy_s, flushed_s = 0.0, start_s
     try:
         for number, done in enumerate(results, start=1):

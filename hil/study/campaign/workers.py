@@ -1,7 +1,8 @@
 """Who does the jobs of a campaign on this machine: worker processes.
 
 They give results as they come, in any order, and outlive a worker that is killed: its jobs are
-given to another. A job is a small picklable value; the function is one of this package's.
+given to another. A job is a small picklable value; the function is one of this package's. Jobs go to a worker
+in groups, which it does side by side where the function can; those of a group that was lost go one by one.
 """
 
 from __future__ import annotations
@@ -15,7 +16,13 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Generic, Self, TypeVar
 
 from hil.core.errors import RigFault
-from hil.study.workers import leave_ctrl_c_to_parent, submit
+from hil.study.workers import (
+    OfGroups,
+    group_size,
+    groups_of,
+    leave_ctrl_c_to_parent,
+    submit,
+)
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -66,34 +73,39 @@ def in_processes(
     jobs: Iterable[Job],
     workers: int,
     lost: Callable[[Job, str], Result] | None = None,
+    side_by_side: int = 1,
 ) -> Iterator[Result]:
-    """Yield the results of all jobs.
+    """Yield the results of all jobs, which go to a worker in groups of `side_by_side`.
 
     A job whose worker dies again and again, in the end with no other job beside it, is given up:
     `lost` makes its result of the job and the reason. Raises RigFault without `lost`, and when
     several jobs in a row are lost.
     """
-    todo, suspects = Waiting(jobs), Waiting[Job](())
+    work = OfGroups(function)
+    todo, suspects = Waiting(groups_of(jobs, side_by_side)), Waiting[tuple[Job, ...]](())
     deaths: Counter[str] = Counter()
     lost_in_a_row = 0
     while todo or suspects:
         queue, most = (suspects, 1) if suspects else (todo, AHEAD * workers)
         pool = _workers(min(workers, most, queue.ahead(most)))
-        running: dict[Future[Result], Job] = {}
+        running: dict[Future[list[Result]], tuple[Job, ...]] = {}
         try:
-            for result in _hand_out(pool, function, queue, running, most):
+            for results in _hand_out(pool, work, queue, running, most):
                 lost_in_a_row = 0
-                yield result
+                yield from results
         except BrokenProcessPool:
-            for future, job in running.items():
+            broken: list[Job] = []
+            for future, group in running.items():
                 if future.done() and future.exception() is None:
-                    yield future.result()
-                    continue
+                    yield from future.result()
+                else:
+                    broken += group
+            for job in broken:
                 deaths[repr(job)] += 1
                 if deaths[repr(job)] < _SUSPECT_DEATHS:
-                    todo.appendleft(job)
+                    todo.appendleft((job,))
                 elif deaths[repr(job)] < _MOST_DEATHS:
-                    suspects.appendleft(job)
+                    suspects.appendleft((job,))
                 else:
                     lost_in_a_row += 1
                     yield _given_up(job, deaths[repr(job)], lost, lost_in_a_row)
@@ -138,10 +150,14 @@ def _hand_out(
 
 
 class Pool:
-    """Worker processes that do one list of jobs after the other and keep its order."""
+    """Worker processes that do one list of jobs after the other and keep its order.
+
+    A function that can do several side by side is given them in groups.
+    """
 
     def __init__(self, function: Callable[[Job], Result], workers: int) -> None:
         self._function = function
+        self._work = OfGroups(function)
         self._count = workers
         self._pool = _workers(workers)
 
@@ -161,15 +177,21 @@ class Pool:
         The jobs of a worker that is killed are done again; raises RigFault when that does not help.
         """
         results: dict[int, Any] = {}
+        size = group_size(self._function, len(jobs), self._count)
         for _ in range(_MOST_DEATHS):
-            places = [place for place in range(len(jobs)) if place not in results]
+            left = (place for place in range(len(jobs)) if place not in results)
             try:
-                futures = {self._pool.submit(self._function, jobs[i]): i for i in places}
+                futures = {
+                    self._pool.submit(self._work, [jobs[i] for i in places]): places
+                    for places in groups_of(left, size)
+                }
                 for future in as_completed(futures):
-                    results[futures[future]] = future.result()
-                    done(futures[future], future.result())
+                    for place, result in zip(futures[future], future.result(), strict=True):
+                        results[place] = result
+                        done(place, result)
                 return [results[place] for place in range(len(jobs))]
             except BrokenProcessPool:
+                size = 1
                 self._pool.shutdown(wait=True, cancel_futures=True)
                 self._pool = _workers(self._count)
         raise RigFault(

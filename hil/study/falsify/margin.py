@@ -12,6 +12,7 @@ from hil.core.errors import BadInput, RigFault
 if TYPE_CHECKING:
     from hil.analysis.metrics import Verdict
     from hil.config.scenario import Scenario
+    from hil.runs.together import Result
 
 # No margin is further from 0 than this: runs that fail utterly are alike.
 FURTHEST = 5.0
@@ -63,21 +64,34 @@ class OneRun:
 
     def __call__(self, job: tuple[Scenario, str, int]) -> Outcome:
         """Return what a run of (scenario, law, seed) came to."""
+        return self.many([job])[0]
+
+    def many(self, jobs: Sequence[tuple[Scenario, str, int]]) -> list[Outcome]:
+        """Return the same of runs made side by side."""
         from pathlib import Path  # noqa: PLC0415 - a worker's own
 
-        from hil.runs.execute import RunSpec, execute_in_memory  # noqa: PLC0415
+        from hil.runs.spec import RunSpec  # noqa: PLC0415
+        from hil.runs.together import execute_together  # noqa: PLC0415
 
-        scenario, law, seed = job
-        spec = RunSpec(scenario, "twin", self.camera, law, self.inner, seed, Path(),
-                       command="hil falsify")  # fmt: skip
-        try:
-            record = execute_in_memory(spec)
-        except (BadInput, RigFault) as error:
-            return Outcome(FURTHEST, str(error), refused=True)
-        t_s = record.samples["t_s"]
-        if record.manifest.outcome == "complete":
-            return Outcome(*margin_of(record.verdicts()))
-        if t_s.size < 2:
-            return Outcome(FURTHEST, record.manifest.outcome_detail, refused=True)
-        left = 1.0 - float(t_s[-1] - t_s[0]) / scenario.duration_s
-        return Outcome(_NO_FIGURE - max(left, 0.0), record.manifest.outcome_detail)
+        made = execute_together(
+            [
+                RunSpec(scenario, "twin", self.camera, law, self.inner, seed, Path(),
+                        command="hil falsify")
+                for scenario, law, seed in jobs
+            ]
+        )  # fmt: skip
+        return [_outcome(job[0], result) for job, result in zip(jobs, made, strict=True)]
+
+
+def _outcome(scenario: Scenario, made: Result) -> Outcome:
+    if isinstance(made, BadInput | RigFault):
+        return Outcome(FURTHEST, str(made), refused=True)
+    if isinstance(made, BaseException):
+        raise made
+    t_s = made.samples["t_s"]
+    if made.manifest.outcome == "complete":
+        return Outcome(*margin_of(made.verdicts()))
+    if t_s.size < 2:
+        return Outcome(FURTHEST, made.manifest.outcome_detail, refused=True)
+    left = 1.0 - float(t_s[-1] - t_s[0]) / scenario.duration_s
+    return Outcome(_NO_FIGURE - max(left, 0.0), made.manifest.outcome_detail)

@@ -2,6 +2,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 
+#include <cstring>
 #include <string>
 
 #include "link.hpp"
@@ -52,6 +53,15 @@ void bind_wheel_state(nb::module_& m) {
         return wire::payload_of<mavlink_wheel_state_t>(view(frame), MAVLINK_MSG_ID_WHEEL_STATE_LEN);
       },
       "frame"_a);
+}
+
+// (name, value, how many there are, index)
+nb::tuple parameter_of(const nb::bytes& frame) {
+  const auto m = wire::payload_of<mavlink_param_value_t>(view(frame), MAVLINK_MSG_ID_PARAM_VALUE_LEN);
+  const std::size_t length = strnlen(m.param_id, sizeof(m.param_id));
+  PyObject* name = PyUnicode_DecodeASCII(m.param_id, static_cast<Py_ssize_t>(length), "replace");
+  if (name == nullptr) throw nb::python_error();
+  return nb::make_tuple(nb::steal(name), m.param_value, m.param_count, m.param_index);
 }
 
 nb::object sample_of(const WheelReport& r) {
@@ -130,6 +140,9 @@ void bind_link(nb::module_& m) {
       .def_prop_ro("seq", &FrameWriter::seq)
       .def("count", &FrameWriter::count)
       .def(
+          "parameter_request",
+          [](FrameWriter& w, std::int16_t index) { return bytes_of(w.parameter_request(index)); }, "index"_a)
+      .def(
           "setpoint",
           [](FrameWriter& w, double left, double right, std::uint16_t seq) {
             return bytes_of(w.setpoint(static_cast<float>(left), static_cast<float>(right), seq));
@@ -156,6 +169,7 @@ void bind_link(nb::module_& m) {
             return bytes_of(l.setpoint(t_s, left, right));
           },
           "t_s"_a, "left_rad_s"_a, "right_rad_s"_a)
+      .def("rest_until", &Link::rest_until, "until_s"_a)
       .def("due", &Link::due, "t_s"_a)
       .def("timer_frames", &timer_frames, "t_s"_a)
       .def("ask_time", [](Link& l, double t_s) { return bytes_of(l.ask_time(t_s)); }, "t_s"_a);
@@ -169,6 +183,7 @@ NB_MODULE(_wire, m) {
   m.def(
       "checksum", [](const nb::bytes& data, std::uint8_t extra) { return wire::checksum(view(data), extra); },
       "data"_a, "extra"_a);
+  m.def("parameter", &parameter_of, "frame"_a);
   bind_wheel_state(m);
   bind_report(m);
   bind_link(m);

@@ -16,7 +16,7 @@ namespace wire {
 
 constexpr char kMarker = '\xfd';
 constexpr std::size_t kHeader = 10, kOverhead = 12;  // header of ten bytes, and with the CRC
-constexpr std::uint8_t kBoardSystem = 1, kHostSystem = 255, kHostComponent = 190;
+constexpr std::uint8_t kBoardSystem = 1, kBoardComponent = 1, kHostSystem = 255, kHostComponent = 190;
 
 // CRC-16/MCRF4XX of some bytes and one more.
 inline std::uint16_t checksum(std::string_view bytes, std::uint8_t extra) {
@@ -163,6 +163,15 @@ class FrameWriter {
     mavlink_timesync_t m{};
     m.ts1 = ts1_ns;
     return frame(m, MAVLINK_MSG_ID_TIMESYNC, MAVLINK_MSG_ID_TIMESYNC_LEN, MAVLINK_MSG_ID_TIMESYNC_CRC);
+  }
+  // What asks the board for the parameter with this index.
+  std::string parameter_request(std::int16_t index) {
+    mavlink_param_request_read_t m{};
+    m.param_index = index;
+    m.target_system = kBoardSystem;
+    m.target_component = kBoardComponent;
+    return frame(m, MAVLINK_MSG_ID_PARAM_REQUEST_READ, MAVLINK_MSG_ID_PARAM_REQUEST_READ_LEN,
+                 MAVLINK_MSG_ID_PARAM_REQUEST_READ_CRC);
   }
   // Takes note that a frame was encoded with `seq` elsewhere.
   void count() { ++seq_; }

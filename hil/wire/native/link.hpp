@@ -77,6 +77,13 @@ class Link {
     }
     timer_due_s_ = std::min(heartbeat_due_s_, timesync_due_s_);
   }
+  // What a procedure (hil/wire/handshake.py) waits for: until_s, or something that it may look at.
+  void rest_until(double until_s) { resting_ = {until_s, heartbeats, reader.counters.signed_frames}; }
+  // Whether that has come. Messages that this class knows nothing of, the caller sees itself.
+  bool rested(double t_s) const {
+    return t_s >= resting_.until_s || heartbeats != resting_.heartbeats ||
+           reader.counters.signed_frames != resting_.signed_frames;
+  }
   // The frame that asks for the board's time; the answer is one more exchange of `clock`.
   std::string ask_time(double t_s) {
     const std::int64_t ts1_ns = core::rounded(t_s * 1e9);
@@ -101,6 +108,10 @@ class Link {
   static constexpr std::size_t kAskedMost = 31;
   static constexpr double kNever_s = -std::numeric_limits<double>::infinity();
 
+  struct Resting {
+    double until_s = kNever_s;
+    std::int64_t heartbeats = 0, signed_frames = 0;
+  };
   struct Sent {
     std::uint16_t seq = 0;
     double t_s = std::numeric_limits<double>::quiet_NaN();
@@ -136,6 +147,7 @@ class Link {
   std::array<Sent, 128> sent_{};
   double timer_due_s_ = kNever_s, heartbeat_due_s_ = kNever_s, timesync_due_s_ = kNever_s;
   std::deque<std::pair<std::int64_t, double>> asked_;
+  Resting resting_;
 };
 
 }  // namespace wire

@@ -1,0 +1,239 @@
+#include "lanes.hpp"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <stdexcept>
+
+#include "lane_block.hpp"
+
+namespace twin {
+namespace {
+
+template <class Act>
+void guarded(Leg& leg, Act act) {
+  try {
+    act();
+  } catch (...) {
+    leg.failed = std::current_exception();
+  }
+  leg.reached_us = leg.kernel->time_us();
+}
+
+void alone(Leg& leg) {
+  guarded(leg, [&] { leg.kernel->advance(leg.t_us); });
+}
+
+// Takes what is not a plain step, until there are plain ones to take or the leg is at its end: returns how many.
+std::int64_t next_steps(Leg& leg) {
+  std::int64_t steps = 0;
+  guarded(leg, [&] {
+    Kernel& kernel = *leg.kernel;
+    while (kernel.goes_on(leg.t_us)) {
+      kernel.coast(leg.t_us);
+      if (!kernel.goes_on(leg.t_us)) return;
+      steps = kernel.plain_steps(leg.t_us);
+      if (steps > 0) return;
+      kernel.step();
+    }
+  });
+  return leg.failed ? 0 : steps;
+}
+
+template <int kWidth>
+class Lanes {
+ public:
+  Lanes(LaneRun run, Leg* legs, std::vector<std::size_t> order)
+      : run_(run), legs_(legs), order_(std::move(order)) {}
+
+  void run() {
+    for (int lane = 0; lane < kWidth; ++lane) fill(lane);
+    while (count() > 0) {
+      const int steps = run_steps();
+      run_(&block_, row_, steps);
+      row_ += steps;
+      for (int lane = 0; lane < kWidth; ++lane) {
+        if (seats_[lane].leg != nullptr) settle(lane, steps);
+      }
+      if (row_ == Block::kRows) row_ = 0;
+    }
+  }
+
+ private:
+  using Block = LaneBlock<kWidth>;
+  using V = typename Block::V;
+  struct Seat {
+    Leg* leg = nullptr;
+    std::int64_t left = 0;  // steps to be taken before the kernel has to be asked
+    int first = 0;          // row of the first that it does not know yet
+  };
+
+  int count() const {
+    return static_cast<int>(
+        std::count_if(seats_.begin(), seats_.end(), [](const Seat& seat) { return seat.leg != nullptr; }));
+  }
+
+  int run_steps() const {
+    std::int64_t steps = Block::kRows - row_;
+    for (const Seat& seat : seats_) {
+      if (seat.leg != nullptr) steps = std::min(steps, seat.left);
+    }
+    return static_cast<int>(steps);
+  }
+
+  // Seats the next leg that has plain steps to take; an empty lane goes on with whatever it holds.
+  void fill(int lane) {
+    Seat& seat = seats_[lane];
+    seat.leg = nullptr;
+    while (next_ < order_.size()) {
+      Leg& leg = legs_[order_[next_++]];
+      const std::int64_t steps = next_steps(leg);
+      if (steps == 0) continue;
+      seat = {&leg, steps, row_ % Block::kRows};
+      load_robot(lane, *leg.kernel);
+      load_state(lane, *leg.kernel);
+      if (!filled_) spread(lane);
+      return;
+    }
+  }
+
+  // Work done since `first` goes to the kernel where it is due or the rows are full.
+  void settle(int lane, int steps) {
+    Seat& seat = seats_[lane];
+    seat.left -= steps;
+    if (block_.diverged[lane] != 0.0) {  // the kernel has not yet heard of these steps: it takes them itself
+      alone(*seat.leg);
+      fill(lane);
+      return;
+    }
+    if (seat.left > 0 && row_ < Block::kRows) return;
+    Leg& leg = *seat.leg;
+    leg.together += row_ - seat.first;
+    guarded(leg, [&] { leg.kernel->follow(track(seat, lane), state(lane)); });
+    seat.first = row_ % Block::kRows;
+    if (leg.failed) {
+      fill(lane);
+    } else if (seat.left == 0) {
+      const std::int64_t reached_us = leg.reached_us;
+      seat.left = next_steps(leg);
+      if (seat.left == 0) {
+        fill(lane);
+      } else if (leg.reached_us != reached_us) {  // it has taken steps of its own
+        load_state(lane, *leg.kernel);
+      } else {
+        load_duty(lane, *leg.kernel);
+      }
+    }
+  }
+
+  Track track(const Seat& seat, int lane) const {
+    constexpr std::ptrdiff_t kRow = sizeof(typename Block::Row) / sizeof(double);
+    const auto* first = reinterpret_cast<const double*>(&block_.rows[seat.first]) + lane;
+    return {first, kRow, kWidth, row_ - seat.first};
+  }
+
+  StateVector state(int lane) const {
+    StateVector out;
+    for (int i = 0; i < kStates; ++i) out[i] = block_.x[i][lane];
+    return out;
+  }
+
+  void load_robot(int lane, const Kernel& kernel) {
+    const Plant& plant = kernel.plant();
+#define X(name) block_.terms.name[lane] = plant.terms().name;
+    TWIN_TERMS(X)
+#undef X
+    const double h_s = 1e-6 * static_cast<double>(kernel.step_us());
+    block_.castor[lane] = plant.castor() ? 1.0 : 0.0;
+    block_.h_s[lane] = h_s;
+    block_.half_h_s[lane] = 0.5 * h_s;
+    block_.sixth_h_s[lane] = h_s / 6.0;
+  }
+
+  void load_state(int lane, const Kernel& kernel) {
+    for (int i = 0; i < kStates; ++i) block_.x[i][lane] = kernel.state()[i];
+    load_duty(lane, kernel);
+  }
+
+  void load_duty(int lane, const Kernel& kernel) {
+    for (int side = 0; side < 2; ++side) block_.duty[side][lane] = kernel.drive().duty[side];
+  }
+
+  // What an empty lane computes has to be some robot's motion, for its speed alone.
+  void spread(int lane) {
+    auto* const numbers = reinterpret_cast<V*>(&block_);
+    constexpr std::size_t kNumbers = offsetof(Block, rows) / sizeof(V);
+    for (std::size_t i = 0; i < kNumbers; ++i) {
+      const double one = numbers[i][lane];
+      for (int other = 0; other < kWidth; ++other) numbers[i][other] = one;
+    }
+    filled_ = true;
+  }
+
+  LaneRun run_;
+  Leg* legs_;
+  std::vector<std::size_t> order_;
+  std::size_t next_ = 0;
+  int row_ = 0;
+  bool filled_ = false;
+  std::array<Seat, kWidth> seats_{};
+  Block block_{};
+};
+
+// The longest way first: its lane would be the last one, alone.
+std::vector<std::size_t> longest_first(const Leg* legs, std::size_t n) {
+  std::vector<std::size_t> order(n);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return legs[a].t_us - legs[a].kernel->time_us() > legs[b].t_us - legs[b].kernel->time_us();
+  });
+  return order;
+}
+
+}  // namespace
+
+std::vector<Width> widths() {
+  std::vector<Width> out = {Width::kOne, Width::kTwo};
+#ifdef TWIN_WIDE_LANES
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) out.push_back(Width::kFour);
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+      __builtin_cpu_supports("avx512vl")) {
+    out.push_back(Width::kEight);
+  }
+#endif
+  return out;
+}
+
+void advance_together(Leg* legs, std::size_t n) {
+  static const Width widest = widths().back();
+  advance_together(legs, n, widest);
+}
+
+void advance_together(Leg* legs, std::size_t n, Width width) {
+  const std::vector<Width> has = widths();
+  if (std::find(has.begin(), has.end(), width) == has.end()) {
+    throw std::invalid_argument("this processor has no registers of that width");
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    legs[i].failed = nullptr;
+    legs[i].together = 0;
+  }
+  if (n < 2 || width == Width::kOne) {
+    for (std::size_t i = 0; i < n; ++i) alone(legs[i]);
+    return;
+  }
+  std::vector<std::size_t> order = longest_first(legs, n);
+#ifdef TWIN_WIDE_LANES
+  if (width == Width::kEight && n > 4) {
+    Lanes<8>(run_eight, legs, std::move(order)).run();
+    return;
+  }
+  if (width >= Width::kFour && n > 2) {
+    Lanes<4>(run_four, legs, std::move(order)).run();
+    return;
+  }
+#endif
+  Lanes<2>(run_two, legs, std::move(order)).run();
+}
+
+}  // namespace twin

@@ -1,0 +1,57 @@
+// Kernels side by side, for Python (sim_twin/_native.pyi).
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/vector.h>
+
+#include <chrono>
+#include <ctime>
+#include <stdexcept>
+#include <vector>
+
+#include "lanes.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace {
+
+using twin::Kernel;
+using twin::Leg;
+using twin::Width;
+
+std::vector<int> lane_widths() {
+  std::vector<int> out;
+  for (const Width width : twin::widths()) out.push_back(static_cast<int>(width));
+  return out;
+}
+
+// A leg's end: the time reached, or the text of what was thrown.
+nb::object ended(const Leg& leg) {
+  if (!leg.failed) return nb::int_(leg.reached_us);
+  try {
+    std::rethrow_exception(leg.failed);
+  } catch (const std::runtime_error& error) {
+    return nb::str(error.what());
+  }
+}
+
+nb::list advance_together(const std::vector<Kernel*>& kernels, const std::vector<std::int64_t>& t_us,
+                          int lanes) {
+  if (kernels.size() != t_us.size()) throw std::invalid_argument("one time for each kernel");
+  std::vector<Leg> legs;
+  for (std::size_t i = 0; i < kernels.size(); ++i) legs.push_back({kernels[i], t_us[i]});
+  if (lanes == 0) {
+    twin::advance_together(legs.data(), legs.size());
+  } else {
+    twin::advance_together(legs.data(), legs.size(), static_cast<Width>(lanes));
+  }
+  nb::list out;
+  for (const Leg& leg : legs) out.append(nb::make_tuple(ended(leg), leg.together));
+  return out;
+}
+
+}  // namespace
+
+void bind_lanes(nb::module_& m) {
+  m.def("lane_widths", &lane_widths);
+  m.def("advance_together", &advance_together, "kernels"_a, "t_us"_a, "lanes"_a = 0);
+}

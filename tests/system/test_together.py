@@ -1,0 +1,144 @@
+"""Runs that advance side by side are to the bit what each is alone, in whatever company."""
+
+from dataclasses import replace
+from functools import partial
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hil.config.load import load_scenario
+from hil.core.errors import BadInput, RigFault
+from hil.core.types import OuterCommand
+from hil.runs import together
+from hil.runs.execute import InMemory, execute_in_memory
+from hil.runs.together import execute_together, run_together
+from tests.system.test_native_intake import CASES, ONE, differences, spec_of
+
+# What one of a company may be besides a case of its own: a run whose ticks or arrivals are Python's.
+APART = {
+    "": [],
+    "another estimator": ["control.estimator=observed-acceleration"],
+    "a host that stops": ['faults=[{kind = "host_stopped", start_s = 1.0, end_s = 1.1}]'],
+    "axes of its own": ["control.axes_rad=0.3"],
+}
+MEMBERS = st.tuples(CASES, st.sampled_from([0.5, 1.0, 2.0]), st.sampled_from(sorted(APART)))
+
+
+def spec_in(member):
+    """Return the spec of a member: of a case, so long, apart in one way or none."""
+    case, duration_s, apart = member
+    spec = spec_of(case)
+    if apart:
+        more = ["duration_s=1.5", *APART[apart]]
+        return replace(spec, scenario=load_scenario(case["scenario"], more))
+    return replace(spec, scenario=spec.scenario.model_copy(update={"duration_s": duration_s}))
+
+
+def require_same(specs, found):
+    """Require of each run found that it is the one made alone."""
+    for spec, record in zip(specs, found, strict=True):
+        assert differences(record, execute_in_memory(spec)) == [], spec.scenario.name
+
+
+@settings(max_examples=12, deadline=None)
+@given(st.lists(MEMBERS, min_size=2, max_size=6))
+def test_runs_side_by_side_are_those_made_alone(members):
+    """Samples, frames, events, counters, outcome and figures, whatever is drawn, in mixed company."""
+    specs = [spec_in(member) for member in members]
+    require_same(specs, execute_together(specs))
+
+
+def test_a_company_of_one_and_of_none():
+    """One run alone in its company is the same run; of none there is none."""
+    require_same([spec_of(ONE)], execute_together([spec_of(ONE)]))
+    assert execute_together([]) == []
+
+
+@pytest.mark.parametrize("fault", ["link_cut", "camera_stall", "motor_stuck", "board_reset"])
+def test_a_run_that_ends_early_ends_alone(fault):
+    """With the same words and rows as alone, and nobody beside it notices."""
+    cases = [ONE, ONE | {"fault": fault, "scenario": "circle"}, ONE | {"seed": 8, "outer": "pid"}]
+    specs = [spec_of(case) for case in cases]
+    found = execute_together(specs)
+    require_same(specs, found)
+    assert found[0].manifest.outcome == found[2].manifest.outcome == "complete"
+
+
+def test_what_cannot_be_opened_leaves_the_others_alone():
+    """A spec whose values do not go together gives the error it raises alone, in its place."""
+    bad = replace(spec_of(ONE), outer="no-such-law")
+    with pytest.raises(BadInput) as alone:
+        execute_in_memory(bad)
+    specs = [spec_of(ONE), bad, spec_of(ONE | {"seed": 4})]
+    found = execute_together(specs)
+    assert type(found[1]) is BadInput
+    assert str(found[1]) == str(alone.value)
+    require_same([specs[0], specs[2]], [found[0], found[2]])
+
+
+class Breaking:
+    """A law that raises on its tenth step."""
+
+    def __init__(self, error):
+        self._error, self._left = error, 10
+
+    def reset(self, *_asked):
+        """Start anew."""
+
+    def step(self, *_asked):
+        """Return rest, at last raise."""
+        self._left -= 1
+        if not self._left:
+            raise self._error
+        return OuterCommand(0.0, 0.0, {})
+
+
+@pytest.mark.parametrize("error", [RigFault("it is broken"), ValueError("no such thing")])
+def test_what_a_law_raises_ends_its_own_run(error):
+    """A fault ends the run as a fault, an error is the result; as alone."""
+    spec = spec_of(ONE)
+    opened = [
+        partial(InMemory, spec),
+        partial(InMemory, spec, law=Breaking(error)),
+        partial(InMemory, replace(spec, seed=9)),
+    ]
+    found = run_together(opened)
+    if isinstance(error, RigFault):
+        assert differences(found[1], execute_in_memory(spec, law=Breaking(error))) == []
+        assert found[1].manifest.outcome_detail == "it is broken"
+    else:
+        assert found[1] is error
+    require_same([spec, replace(spec, seed=9)], [found[0], found[2]])
+
+
+def test_an_interruption_stops_all():
+    """Ctrl-C in one run stops every robot, and is told once all have stopped."""
+    opened = []
+
+    def open_one(law=None):
+        opened.append(InMemory(spec_of(ONE), law=law))
+        return opened[-1]
+
+    with pytest.raises(KeyboardInterrupt):
+        run_together([open_one, partial(open_one, Breaking(KeyboardInterrupt())), open_one])
+    for run in opened:
+        assert run.session.ending.outcome == "interrupted"
+        assert "stopped" in [event.kind for event in run.record().events]
+
+
+def test_the_comparison_sees_a_rig_moved_too_far(monkeypatch):
+    """A run whose company moves its rig on by a step more is another run (negative control)."""
+    spec = spec_of(ONE | {"scenario": "circle"})
+    alone = execute_in_memory(spec)
+    begin = together._Company.begin
+
+    def too_far(self):
+        begin(self)
+        self._sessions[0]._parts.rig.wait(self._sessions[0]._parts.rig.now_s() + 1e-4)
+
+    monkeypatch.setattr(together._Company, "begin", too_far)
+    moved, other = execute_together([spec, replace(spec, seed=5)])
+    assert "samples.est_x_m" in differences(alone, moved)
+    monkeypatch.undo()
+    assert differences(other, execute_in_memory(replace(spec, seed=5))) == []
