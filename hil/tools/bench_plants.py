@@ -11,15 +11,19 @@ import importlib
 import importlib.util
 import time
 from collections.abc import Callable
+from functools import partial
+from random import Random
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hil.analysis.speed import Figure, Plan, measure
+from hil.config.events import Disturbance
+from hil.config.link import UART_BAUD
 from hil.config.load import load_scenario
 from hil.tools.plant_port import OF_ARRAYS, Functions, counted, make_step, numbers_of
 from sim_twin import _native
-from sim_twin.setup import STEP_US, plant_params
+from sim_twin.setup import STEP_US, make_kernel, plant_params
 
 if TYPE_CHECKING:
     from hil.config.robot import RobotConfig
@@ -30,6 +34,7 @@ _DUTIES = (0.5, 0.3)
 _NATIVE_STEPS = 20_000
 _PORT_STEPS = 20
 _PORT_RUNS = 1000
+_LANE_STEPS = 5_000
 _CHAINED = 500_000
 _SIDE_BY_SIDE = 200_000_000
 _NS = 1e9
@@ -72,6 +77,11 @@ def plant_figures(runs: int) -> list[Figure]:
     if importlib.util.find_spec("mujoco") is not None:
         plans.append((f"MuJoCo, four wheels, one step of {MUJOCO_STEP_S:g} s", "ns", "",
                       mujoco_ns(robot)))  # fmt: skip
+    plans += [
+        (f"plant, board and encoders pushed by a load, {width} side by side, one step of one", "ns",
+         "", partial(lanes_ns, robot, width))
+        for width in _native.lane_widths()
+    ]  # fmt: skip
     figures = [measure(name, unit, goal, runs, once) for name, unit, goal, once in plans]
     return [*figures, *limit_figures(robot, runs)]
 
@@ -102,6 +112,26 @@ def native_ns(robot: RobotConfig) -> float:
     start_s = time.process_time()
     plant.run(_NATIVE_STEPS, _H_S, *_DUTIES, None)
     return (time.process_time() - start_s) / _NATIVE_STEPS * _NS
+
+
+def lanes_ns(robot: RobotConfig, width: int) -> float:
+    """Return processor time of a step of one of several robots side by side, board and encoders with it."""
+    push = Disturbance(target="force_forward_n", shape="step", amplitude=8.0)
+    kernels = [make_kernel(robot, UART_BAUD, Random(k), [push]) for k in range(width)]
+    for kernel in kernels:
+        kernel.begin(0)
+    end_us, waiting = _LANE_STEPS * STEP_US, kernels
+    start_s = time.process_time()
+    while waiting:
+        reached = _native.advance_together(waiting, [end_us] * len(waiting), width)
+        for kernel in waiting:
+            kernel.take_sent()
+        waiting = [
+            kernel
+            for kernel, (t_us, _) in zip(waiting, reached, strict=True)
+            if isinstance(t_us, int) and t_us < end_us
+        ]
+    return (time.process_time() - start_s) / (_LANE_STEPS * width) * _NS
 
 
 def start_state(robot: RobotConfig) -> tuple[float, ...]:
