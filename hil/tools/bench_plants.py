@@ -72,9 +72,9 @@ def plant_figures(runs: int) -> list[Figure]:
         (f"the same in numpy, {_PORT_RUNS} runs side by side, one of them", "ns", "",
          numpy_ns(robot)),
     ]  # fmt: skip
-    if importlib.util.find_spec("numba") is not None:
+    if _installed("numba"):
         plans.append(("the same in numba", "ns", "", numba_ns(robot)))
-    if importlib.util.find_spec("mujoco") is not None:
+    if _installed("mujoco"):
         plans.append((f"MuJoCo, four wheels, one step of {MUJOCO_STEP_S:g} s", "ns", "",
                       mujoco_ns(robot)))  # fmt: skip
     plans += [
@@ -86,12 +86,16 @@ def plant_figures(runs: int) -> list[Figure]:
     return [*figures, *limit_figures(robot, runs)]
 
 
+def _installed(package: str) -> bool:
+    return importlib.util.find_spec(package) is not None
+
+
 def limit_figures(robot: RobotConfig, runs: int) -> list[Figure]:
     """Return what a step takes at least: as a chain of results, and as operations side by side."""
     operations = sum(counted(robot, {})[0].values())
     waits = [chain_ns(robot) for _ in range(runs + 1)][1:]  # the first is not counted
     found = [
-        Figure.of("operations of a step", "flop", [operations], ""),
+        Figure.of("operations of a step", "flop", [operations] * runs, ""),
         Figure.of("limit: a step's results that wait for each other", "ns", waits, ""),
     ]
     width = 2
