@@ -42,8 +42,11 @@ def chained(chain: int, operations: int) -> float:
 def widest_register() -> int:
     """Return how many doubles a register of this processor holds at most: 2, 4 or 8."""
 
-def side_by_side(width: int, operations: int) -> int:
-    """Do at least so many independent sums and products, `width` a register; return how many, 0 for none."""
+def side_by_side(width: int, operations: int, quotients: bool = False) -> int:
+    """Do at least so many independent sums and products, or quotients, `width` doubles a register.
+
+    Returns how many; 0 where the processor does not have the width.
+    """
 
 class Plant:
     """The robot alone: bridge duty in, motion out."""

@@ -12,18 +12,15 @@ import importlib.util
 import time
 from collections.abc import Callable
 from functools import partial
-from random import Random
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hil.analysis.speed import Figure, Plan, measure
-from hil.config.events import Disturbance
-from hil.config.link import UART_BAUD
 from hil.config.load import load_scenario
 from hil.tools.plant_port import OF_ARRAYS, Functions, counted, make_step, numbers_of
 from sim_twin import _native
-from sim_twin.setup import STEP_US, make_kernel, plant_params
+from sim_twin.setup import STEP_US, plant_params
 
 if TYPE_CHECKING:
     from hil.config.robot import RobotConfig
@@ -78,9 +75,10 @@ def plant_figures(runs: int) -> list[Figure]:
         plans.append((f"MuJoCo, four wheels, one step of {MUJOCO_STEP_S:g} s", "ns", "",
                       mujoco_ns(robot)))  # fmt: skip
     plans += [
-        (f"plant, board and encoders pushed by a load, {width} side by side, one step of one", "ns",
-         "", partial(lanes_ns, robot, width))
+        (f"plant, {width} side by side in a register, one step of one", "ns", "",
+         partial(lanes_ns, robot, width))
         for width in _native.lane_widths()
+        if width > 1
     ]  # fmt: skip
     figures = [measure(name, unit, goal, runs, once) for name, unit, goal, once in plans]
     return [*figures, *limit_figures(robot, runs)]
@@ -92,7 +90,8 @@ def _installed(package: str) -> bool:
 
 def limit_figures(robot: RobotConfig, runs: int) -> list[Figure]:
     """Return what a step takes at least: as a chain of results, and as operations side by side."""
-    operations = sum(counted(robot, {})[0].values())
+    kinds = counted(robot, {})[0]
+    operations, slow = sum(kinds.values()), kinds["quotient"] + kinds["root"]
     waits = [chain_ns(robot) for _ in range(runs + 1)][1:]  # the first is not counted
     found = [
         Figure.of("operations of a step", "flop", [operations] * runs, ""),
@@ -105,6 +104,8 @@ def limit_figures(robot: RobotConfig, runs: int) -> list[Figure]:
             Figure.of(f"sums and products, {width} a register", "flop/ns", rates, ""),
             Figure.of(f"limit: a step's operations, {width} runs a register", "ns",
                       [operations / rate for rate in rates], ""),
+            Figure.of(f"limit: its quotients and roots, {width} runs a register", "ns",
+                      [slow / rate_flop_ns(width, quotients=True) for _ in range(runs)], ""),
         ]  # fmt: skip
         width *= 2
     return found
@@ -119,23 +120,10 @@ def native_ns(robot: RobotConfig) -> float:
 
 
 def lanes_ns(robot: RobotConfig, width: int) -> float:
-    """Return processor time of a step of one of several robots side by side, board and encoders with it."""
-    push = Disturbance(target="force_forward_n", shape="step", amplitude=8.0)
-    kernels = [make_kernel(robot, UART_BAUD, Random(k), [push]) for k in range(width)]
-    for kernel in kernels:
-        kernel.begin(0)
-    end_us, waiting = _LANE_STEPS * STEP_US, kernels
-    start_s = time.process_time()
-    while waiting:
-        reached = _native.advance_together(waiting, [end_us] * len(waiting), width)
-        for kernel in waiting:
-            kernel.take_sent()
-        waiting = [
-            kernel
-            for kernel, (t_us, _) in zip(waiting, reached, strict=True)
-            if isinstance(t_us, int) and t_us < end_us
-        ]
-    return (time.process_time() - start_s) / (_LANE_STEPS * width) * _NS
+    """Return processor time of a step of one of `width` robots side by side in a register."""
+    runs = 8
+    spent_s = _native.plant_lane_time(plant_params(robot), width, runs, _LANE_STEPS)
+    return spent_s / (_LANE_STEPS * runs) * _NS
 
 
 def start_state(robot: RobotConfig) -> tuple[float, ...]:
@@ -237,8 +225,11 @@ def chain_ns(robot: RobotConfig) -> float:
     return counted(robot, takes)[1]
 
 
-def rate_flop_ns(width: int) -> float:
-    """Return sums and products a nanosecond of this core, `width` doubles a register."""
+def rate_flop_ns(width: int, *, quotients: bool = False) -> float:
+    """Return sums and products, or quotients, a nanosecond of this core, `width` doubles a register.
+
+    Roots go through the same unit as quotients and take no less.
+    """
     start_s = time.process_time()
-    done = _native.side_by_side(width, _SIDE_BY_SIDE)
+    done = _native.side_by_side(width, _SIDE_BY_SIDE // (10 if quotients else 1), quotients)
     return done / (time.process_time() - start_s) / _NS

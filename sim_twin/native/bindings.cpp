@@ -66,7 +66,7 @@ void bind_processor(nb::module_& m) {
       },
       "chain"_a, "operations"_a);
   m.def("widest_register", &twin::widest_register);
-  m.def("side_by_side", &twin::side_by_side, "width"_a, "operations"_a);
+  m.def("side_by_side", &twin::side_by_side, "width"_a, "operations"_a, "quotients"_a = false);
 }
 
 void bind_plant(nb::module_& m) {

@@ -20,16 +20,20 @@ using Four = double __attribute__((vector_size(32)));
 using Eight = double __attribute__((vector_size(64)));
 
 template <typename Wide>
-PROCESSOR_INLINE std::int64_t work(std::int64_t operations) {
+PROCESSOR_INLINE std::int64_t work(std::int64_t operations, bool quotients) {
   constexpr int Width = sizeof(Wide) / sizeof(double);
   Wide value[kRegisters];
   const Wide factor = unknown(0.999) + Wide{}, term = unknown(0.001) + Wide{};
-  for (int i = 0; i < kRegisters; ++i) value[i] = unknown(0.1 * i) + Wide{};
-  const std::int64_t each = 2 * kRegisters * Width;
+  for (int i = 0; i < kRegisters; ++i) value[i] = unknown(1.0 + 0.1 * i) + Wide{};
+  const std::int64_t each = (quotients ? 1 : 2) * kRegisters * Width;
   const std::int64_t rounds = (operations + each - 1) / each;
-  for (std::int64_t round = 0; round < rounds; ++round) {
+  for (std::int64_t round = 0; round < rounds && !quotients; ++round) {
 #pragma GCC unroll 10
     for (int i = 0; i < kRegisters; ++i) value[i] = value[i] * factor + term;
+  }
+  for (std::int64_t round = 0; round < rounds && quotients; ++round) {
+#pragma GCC unroll 10
+    for (int i = 0; i < kRegisters; ++i) value[i] = factor / value[i];
   }
   Wide sum{};
   for (int i = 0; i < kRegisters; ++i) sum += value[i];
@@ -39,9 +43,11 @@ PROCESSOR_INLINE std::int64_t work(std::int64_t operations) {
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #define PROCESSOR_X86
-__attribute__((target("avx2"))) std::int64_t four(std::int64_t operations) { return work<Four>(operations); }
-__attribute__((target("avx512f"))) std::int64_t eight(std::int64_t operations) {
-  return work<Eight>(operations);
+__attribute__((target("avx2"))) std::int64_t four(std::int64_t operations, bool quotients) {
+  return work<Four>(operations, quotients);
+}
+__attribute__((target("avx512f"))) std::int64_t eight(std::int64_t operations, bool quotients) {
+  return work<Eight>(operations, quotients);
 }
 #endif
 
@@ -56,16 +62,11 @@ double repeated(std::int64_t operations, double value, Operation operation) {
 double chained(Chain chain, std::int64_t operations) {
   const double one = unknown(1.0), near_one = unknown(0.9999999), small = unknown(1e-9);
   switch (chain) {
-    case kSums:
-      return repeated(operations, one, [small](double v) { return v + small; });
-    case kProducts:
-      return repeated(operations, one, [near_one](double v) { return v * near_one; });
-    case kQuotients:
-      return repeated(operations, one, [near_one](double v) { return near_one / v; });
-    case kRoots:
-      return repeated(operations, unknown(7.0), [](double v) { return std::sqrt(v); });
-    default:
-      return repeated(operations, one, [](double v) { return std::cos(v); });
+    case kSums: return repeated(operations, one, [small](double v) { return v + small; });
+    case kProducts: return repeated(operations, one, [near_one](double v) { return v * near_one; });
+    case kQuotients: return repeated(operations, one, [near_one](double v) { return near_one / v; });
+    case kRoots: return repeated(operations, unknown(7.0), [](double v) { return std::sqrt(v); });
+    default: return repeated(operations, one, [](double v) { return std::cos(v); });
   }
 }
 
@@ -77,11 +78,11 @@ int widest_register() {
   return 2;
 }
 
-std::int64_t side_by_side(int width, std::int64_t operations) {
-  if (width == 2) return work<Two>(operations);
+std::int64_t side_by_side(int width, std::int64_t operations, bool quotients) {
+  if (width == 2) return work<Two>(operations, quotients);
 #ifdef PROCESSOR_X86
-  if (width == 4 && widest_register() >= 4) return four(operations);
-  if (width == 8 && widest_register() >= 8) return eight(operations);
+  if (width == 4 && widest_register() >= 4) return four(operations, quotients);
+  if (width == 8 && widest_register() >= 8) return eight(operations, quotients);
 #endif
   return 0;
 }

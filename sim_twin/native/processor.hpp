@@ -15,8 +15,8 @@ double chained(Chain chain, std::int64_t operations);
 // Doubles that a register of this processor holds at most: 2, 4 or 8.
 int widest_register();
 
-// Does at least so many products and sums in registers of a width, independent of each other as far as ten registers
-// go; returns how many. None where the processor does not have the width.
-std::int64_t side_by_side(int width, std::int64_t operations);
+// Does at least so many products and sums, or quotients, in registers of a width, independent of each other as far as
+// ten registers go; returns how many. None where the processor does not have the width.
+std::int64_t side_by_side(int width, std::int64_t operations, bool quotients);
 
 }  // namespace twin

@@ -118,6 +118,7 @@ def test_the_limits_of_this_core(monkeypatch):
     widest = _native.widest_register()
     assert widest in {2, 4, 8}
     assert 10_000 <= _native.side_by_side(widest, 10_000) < 10_200
+    assert 10_000 <= _native.side_by_side(widest, 10_000, quotients=True) < 10_100
     assert _native.side_by_side(2 * widest, 10_000) == 0
     names = [figure.name for figure in bench_plants.limit_figures(ROBOT, 1)]
     assert names[0] == "operations of a step"
