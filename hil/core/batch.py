@@ -13,6 +13,9 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+# So many runs side by side feed the lanes of one core (docs/performance.md).
+SIDE_BY_SIDE = 16
+
 Array = NDArray[np.float64]
 Pairs = tuple[Array, Array]
 

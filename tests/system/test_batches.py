@@ -50,7 +50,9 @@ def specs_of(outer):
         ONE | {"seed": 6, "scenario": "circle", "fault": "link_cut"},
     ]
     specs = [replace(spec_of(case), outer=outer) for case in cases]
-    held = load_scenario("scenario-1", ["duration_s=3", "start={x_m=0.04, y_m=0.34, theta_rad=1.2}"])
+    held = load_scenario(
+        "scenario-1", ["duration_s=3", "start={x_m=0.04, y_m=0.34, theta_rad=1.2}"]
+    )
     gains = load_scenario("scenario-2", ["duration_s=1", *_gain(outer)])
     return [*specs, replace(specs[0], scenario=held), replace(specs[0], scenario=gains)]
 

@@ -24,9 +24,9 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make what is timed short; the rendered path and long tables are left to the command itself."""
     monkeypatch.setattr(bench_runs, "_STEPS", 200)
 
-    def worked(*_run: object) -> float:
+    def worked(*_run: object) -> tuple[float, int]:
         assert sum(range(50_000)) > 0  # takes a while
-        return 11.0
+        return 11.0, 1
 
     monkeypatch.setattr(bench_runs, "_simulated", worked)
 
@@ -43,7 +43,7 @@ def test_batch_says_runs_and_times_real_time_of_each_path() -> None:
     assert done.json["program"].startswith("skid-steer-hil ")
     assert done.json["machine"]["cores"] >= 1
     found = {(item["name"], item["unit"]): item for item in done.json["figures"]}
-    assert len(found) == 17  # three ways of the pose camera, two tasks; rendered; plant and kernel
+    assert len(found) == 21  # four ways of the pose camera, two tasks; rendered; plant and kernel
     assert ("the same, taken in by Python", "x real time") in found
     for item in found.values():
         assert len(item["values"]) == item["runs"] == 3
@@ -59,8 +59,11 @@ def test_the_simulated_time_of_a_run_is_that_of_its_rig() -> None:
     scenario = bench_runs.load_scenario("scenario-1", ["duration_s=1"])
     ways = (bench_runs.NATIVE, bench_runs.ASKED, bench_runs.PYTHON)
     one, *others = (bench_runs._simulated(scenario, "pose", "pid", way) for way in ways)
-    assert 1.0 < one < 3.0
+    assert 1.0 < one[0] < 3.0
     assert others == [one, one]
+    both = bench_runs._simulated(scenario, "pose", "pid", bench_runs.TOGETHER)
+    assert both[0] == pytest.approx(bench_runs.SIDE_BY_SIDE * one[0], rel=0.05)
+    assert both[1] == bench_runs.SIDE_BY_SIDE
 
 
 def test_the_campaign_is_the_built_in_one_with_fewer_runs() -> None:
@@ -118,7 +121,7 @@ def test_against_a_file_of_this_command_compares_and_any_other_is_refused(tmp_pa
     file.write_text(json.dumps(hil("bench", "batch", "--runs", 2, "--json").json), encoding="utf-8")
     done = hil("bench", "batch", "--runs", 2, "--against", file, "--json")
     assert done.status == 0
-    assert len(done.json["against"]) == 17
+    assert len(done.json["against"]) == 21
     assert all(item["low"] <= item["ratio"] * 1.001 for item in done.json["against"])
     assert "now / then" in hil("bench", "batch", "--runs", 1, "--against", file).out
     other = tmp_path / "other.json"
