@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 # So many runs side by side feed the lanes of one core (docs/performance.md).
-SIDE_BY_SIDE = 16
+SIDE_BY_SIDE = 32
 
 Array = NDArray[np.float64]
 Pairs = tuple[Array, Array]
