@@ -165,6 +165,12 @@ _Span = tuple[float, float]
 def lane_widths() -> list[int]:
     """Return how many robots this processor can move side by side, 1 (one by one) first."""
 
+def plant_lane_time(params: PlantParams, lanes: int, runs: int, steps: int) -> float:
+    """Return the processor time in s of `steps` plain steps of `runs` rolling robots, `lanes` side by side.
+
+    Without boards and encoders; `runs` is a multiple of `lanes`, which is one of `lane_widths`.
+    """
+
 def advance_together(
     kernels: Sequence[Kernel], t_us: Sequence[int], lanes: int = 0
 ) -> list[tuple[int | str, int]]:

@@ -108,7 +108,7 @@ std::int64_t Kernel::advance(std::int64_t t_us) {
 // Takes at once the steps of a robot that stands while its board has nothing to do: of all that a step
 // does only the clock, the charge and the remembered poses would change.
 void Kernel::coast(std::int64_t t_us) {
-  if (outside_ || !faults_.empty() || (!disturbances_.empty() && time_us_ >= begin_us_)) return;
+  if (outside_ || !faults_.empty() || disturbed()) return;
   std::int64_t until_us = std::min(t_us, board_->quiet_until_us());
   if (!disturbances_.empty()) until_us = std::min(until_us, begin_us_);
   if (until_us <= time_us_ + options_.step_us) return;
@@ -156,7 +156,7 @@ void Kernel::set_outside(OutsidePlant outside, std::int64_t period_us) {
 }
 
 LoadVector Kernel::loads_now() const {
-  if (disturbances_.empty() || time_us_ < begin_us_) return LoadVector{};
+  if (!disturbed()) return LoadVector{};
   const StateVector& x = plant_.state();
   return disturbances_.loads(1e-6 * static_cast<double>(time_us_ - begin_us_), x[kX], x[kY]);
 }
@@ -187,17 +187,21 @@ void Kernel::integrate() {
     return;
   }
   sag_v_ = 0.0;
-  if (disturbances_.empty() || time_us_ < begin_us_) {
+  if (!disturbed()) {
     plant_.step(h_s, drive_);
     return;
   }
-  const double t_s = 1e-6 * static_cast<double>(time_us_ - begin_us_);
-  // Zones are looked up at the pose where the step begins: 0.1 mm at most.
-  const double x_m = plant_.state()[kX], y_m = plant_.state()[kY];
-  const LoadVector end = disturbances_.loads(t_s + h_s, x_m, y_m);
-  plant_.step(h_s, drive_, disturbances_.loads(t_s, x_m, y_m), disturbances_.loads(t_s + 0.5 * h_s, x_m, y_m),
-              end);
-  sag_v_ = end[kBatterySag];
+  const StepLoads loads = step_loads(time_us_, plant_.state()[kX], plant_.state()[kY]);
+  plant_.step(h_s, drive_, loads[0], loads[1], loads[2]);
+  sag_v_ = loads[2][kBatterySag];
+}
+
+// Zones are looked up at the pose where the step begins: 0.1 mm at most.
+Kernel::StepLoads Kernel::step_loads(std::int64_t t_us, double x_m, double y_m) const {
+  const double h_s = 1e-6 * static_cast<double>(options_.step_us);
+  const double t_s = 1e-6 * static_cast<double>(t_us - begin_us_);
+  return {disturbances_.loads(t_s, x_m, y_m), disturbances_.loads(t_s + 0.5 * h_s, x_m, y_m),
+          disturbances_.loads(t_s + h_s, x_m, y_m)};
 }
 
 void Kernel::set_faults() {

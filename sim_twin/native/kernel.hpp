@@ -85,14 +85,21 @@ class Kernel {
   // Returns the time reached. Throws when the state diverges.
   std::int64_t advance(std::int64_t t_us);
   // For those who work steps out elsewhere. `advance` is: while it has to go on (`goes_on`), coast, and where it
-  // still has to, take a `step`, or as many as `plain_steps` says elsewhere and `follow` them.
+  // still has to, take a `step`, or as many as `even_steps` says elsewhere and `follow` them.
   bool goes_on(std::int64_t t_us) const { return time_us_ < t_us && board_->sent.empty(); }
   void coast(std::int64_t t_us);
   void step();
-  // How many steps towards t_us are those of a robot that rolls, under one duty and with nothing acting from
-  // outside; the board is asked after the last one at the earliest. 0: take a `step`.
-  std::int64_t plain_steps(std::int64_t t_us);
-  void follow(const Track& track, const StateVector& end);
+  // How many steps towards t_us are those of a robot that rolls, under one duty; the board is asked after the
+  // last one at the earliest. 0: take a `step`.
+  std::int64_t even_steps(std::int64_t t_us);
+  // Whether disturbances are reckoned with now.
+  bool disturbed() const { return !disturbances_.empty() && time_us_ >= begin_us_; }
+  // Whether anything acts on the robot from outside in them, or a gear is jammed.
+  bool acted_on() const { return acted_on_; }
+  using StepLoads = std::array<LoadVector, 3>;  // at a step's begin, middle and end
+  // Those of a step that begins at t_us (not before `begin`) and at this place.
+  StepLoads step_loads(std::int64_t t_us, double x_m, double y_m) const;
+  void follow(const Track& track, const StateVector& end, double sag_v);
   const Plant& plant() const { return plant_; }
   const Drive& drive() const { return drive_; }
   std::int64_t step_us() const { return options_.step_us; }
@@ -145,6 +152,7 @@ class Kernel {
   double sag_v_ = 0.0;
   double battery_v_ = 0.0;
   bool board_held_ = false;
+  bool acted_on_ = false;  // in the steps that even_steps has given
 };
 
 }  // namespace twin

@@ -72,6 +72,23 @@ LoadVector Disturbances::loads(double t_s, double x_m, double y_m) const {
   return out;
 }
 
+double Disturbances::steady_until_s(double t_s) const {
+  double until_s = std::numeric_limits<double>::infinity();
+  for (const Disturbance& d : items_) {
+    if (t_s < d.start_s) {
+      until_s = std::min(until_s, d.start_s);
+    } else if (t_s < d.end_s) {
+      until_s = std::min(until_s, d.end_s);
+    }
+  }
+  return until_s;
+}
+
+bool Disturbances::at_work(double t_s) const {
+  return std::any_of(items_.begin(), items_.end(),
+                     [t_s](const Disturbance& d) { return d.start_s <= t_s && t_s < d.end_s; });
+}
+
 FaultState Faults::at(double t_s) const {
   FaultState out;
   for (const Fault& fault : items_) {

@@ -33,6 +33,9 @@ class Disturbances {
   void add(const Disturbance& disturbance) { items_.push_back(disturbance); }
   bool empty() const { return items_.empty(); }
   LoadVector loads(double t_s, double x_m, double y_m) const;
+  // Until when they are what they are at t_s: all nothing, or one of them going on.
+  double steady_until_s(double t_s) const;
+  bool at_work(double t_s) const;  // whether any goes on
 
  private:
   std::vector<Disturbance> items_;

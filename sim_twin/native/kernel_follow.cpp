@@ -18,14 +18,15 @@ std::int64_t Kernel::steps_to(std::int64_t t_us) const {
   return (t_us - time_us_ + options_.step_us - 1) / options_.step_us;
 }
 
-// Steps that begin while no fault comes or goes, or less by one for the rounding of their times.
+// Steps that lie between the times at which faults and loads come or go, or less by two for the rounding of times.
 std::int64_t Kernel::steady_steps() const {
   constexpr std::int64_t kMany = std::int64_t{1} << 40;
-  if (faults_.empty() || begin_us_ >= kNever_us) return kMany;
+  if ((faults_.empty() && disturbances_.empty()) || begin_us_ >= kNever_us) return kMany;
   const double since_s = 1e-6 * static_cast<double>(std::max<std::int64_t>(time_us_ - begin_us_, 0));
   const double begin_s = 1e-6 * static_cast<double>(std::max<std::int64_t>(begin_us_ - time_us_, 0));
-  const double steady_s = faults_.steady_until_s(since_s) - since_s + begin_s;
-  const double steps = std::floor(1e6 * steady_s / static_cast<double>(options_.step_us)) - 1.0;
+  const double until_s = std::min(faults_.steady_until_s(since_s), disturbances_.steady_until_s(since_s));
+  const double steady_s = until_s - since_s + begin_s;
+  const double steps = std::floor(1e6 * steady_s / static_cast<double>(options_.step_us)) - 2.0;
   return static_cast<std::int64_t>(std::clamp(steps, 0.0, static_cast<double>(kMany)));
 }
 
@@ -39,18 +40,19 @@ bool Kernel::edges_are_counts() const {
   return encoders_[0].in_order() && encoders_[1].in_order() && board_->takes_turns(pins);
 }
 
-std::int64_t Kernel::plain_steps(std::int64_t t_us) {
+std::int64_t Kernel::even_steps(std::int64_t t_us) {
   if (outside_ || !plant_.rolls() || time_us_ < kEarly_steps * options_.step_us) return 0;
   std::int64_t until_us = std::min(t_us, board_->quiet_until_us());
-  if (!disturbances_.empty()) {
-    if (time_us_ >= begin_us_) return 0;
-    until_us = std::min(until_us, begin_us_);
-  }
+  if (!disturbances_.empty() && time_us_ < begin_us_) until_us = std::min(until_us, begin_us_);
   const std::int64_t steps = std::min(steps_to(until_us), steady_steps());
   if (steps < 1) return 0;
   set_faults();
   set_drive();
-  if (drive_.jam[0] != 0.0 || drive_.jam[1] != 0.0 || !edges_are_counts()) return 0;
+  if (!edges_are_counts()) return 0;
+  const bool jammed = drive_.jam[0] != 0.0 || drive_.jam[1] != 0.0;
+  acted_on_ =
+      jammed || (disturbed() && disturbances_.at_work(1e-6 * static_cast<double>(time_us_ - begin_us_)));
+  if (disturbed() || jammed) return steps;
   // A robot that stands is left to `coast`, of which one whole step has to be seen first.
   const StateVector& x = plant_.state();
   const bool stands = drive_.duty[0] == 0.0 && drive_.duty[1] == 0.0 && x[kOmegaL] == 0.0 &&
@@ -59,7 +61,7 @@ std::int64_t Kernel::plain_steps(std::int64_t t_us) {
 }
 
 // Of all steps but the last the board learns the encoders' counts alone; the last one it meets as any other.
-void Kernel::follow(const Track& track, const StateVector& end) {
+void Kernel::follow(const Track& track, const StateVector& end, double sag_v) {
   const std::int64_t last = track.steps - 1;
   double wheel_rad[2] = {plant_.state()[kWheelL], plant_.state()[kWheelR]};
   if (last > 0) {
@@ -78,7 +80,7 @@ void Kernel::follow(const Track& track, const StateVector& end) {
     }
     time_us_ = until_us;
   }
-  sag_v_ = 0.0;
+  sag_v_ = sag_v;
   plant_.changed_state() = end;
   end_step(wheel_rad);
 }

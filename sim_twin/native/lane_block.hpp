@@ -36,14 +36,15 @@ struct LaneBlock {
   V h_s, half_h_s, sixth_h_s;
   V duty[2], jam[2];
   V x[kStates];
-  V diverged;  // not 0: a wheel has run away, or a state is no number
+  V loads[3][kLoads];  // at a step's begin, middle and end
+  V diverged;          // set where a wheel has run away, or a state is no number
   Row rows[kRows];
 };
 
-// Takes `steps` steps without loads and jams; the row of the first one is rows[first].
-using LaneRun = void (*)(void* block, int first, int steps);
-void run_two(void* block, int first, int steps);
-void run_four(void* block, int first, int steps);   // x86 with AVX2
-void run_eight(void* block, int first, int steps);  // x86 with AVX-512
+// Takes `steps` steps, all with the block's loads and jams or without; the row of the first one is rows[first].
+using LaneRun = void (*)(void* block, int first, int steps, bool loaded);
+void run_two(void* block, int first, int steps, bool loaded);
+void run_four(void* block, int first, int steps, bool loaded);   // x86 with AVX2
+void run_eight(void* block, int first, int steps, bool loaded);  // x86 with AVX-512
 
 }  // namespace twin

@@ -75,6 +75,16 @@ struct Many {
   TWIN_INLINE static Two zero_where_below(const Two& size, double limit, const Two& v) {
     return {{zero_where_below(size.v[0], limit, v.v[0]), zero_where_below(size.v[1], limit, v.v[1])}};
   }
+  TWIN_INLINE static Two brakes(const Two& torque_n_m, const Two& omega_rad_s, const V& smooth_rad_s) {
+    Two out{};
+    for (int side = 0; side < 2; ++side) {
+      if (!any_of(torque_n_m[side] > 0.0)) continue;
+      for (int lane = 0; lane < TWIN_LANES; ++lane) {
+        out.v[side][lane] = brake_torque(torque_n_m[side][lane], omega_rad_s[side][lane], smooth_rad_s[lane]);
+      }
+    }
+    return out;
+  }
   TWIN_INLINE static void turn_where_far(const V& by_rad, const V& d2, V& less, V& s) {
     const Mask near = d2 < kFarTurn2_rad2;
     if (!any_of(~near)) return;
@@ -88,11 +98,17 @@ struct Many {
   }
 };
 
-template <bool kCastors>
+// With loads the castor's part is always worked out, for those that have one.
+template <bool kCastors, Acts kActs>
 TWIN_INLINE void run(Block& block, int first, int steps) {
-  using Lanes = Model<Many<kCastors>, Acts::kNothing>;
-  const typename Many<kCastors>::Loads none{};
-  const Two duty{{block.duty[0], block.duty[1]}}, jam{};
+  using Lanes = Model<Many<kCastors>, kActs>;
+  typename Many<kCastors>::Loads loads[3] = {};
+  if (kActs == Acts::kLoads) {
+    for (int at = 0; at < 3; ++at) {
+      for (int load = 0; load < kLoads; ++load) loads[at].v[load] = block.loads[at][load];
+    }
+  }
+  const Two duty{{block.duty[0], block.duty[1]}}, jam{{block.jam[0], block.jam[1]}};
   const Lanes model{block.terms, duty, jam, block.castor != 0.0};
   V* const x = block.x;
   PairedState<Two> now{{{{x[kX], x[kY]}},
@@ -106,7 +122,8 @@ TWIN_INLINE void run(Block& block, int first, int steps) {
   for (int step = first; step < first + steps; ++step) {
     V cos, sin;
     headings((const double*)&now[kTurn].v[0], (double*)&cos, (double*)&sin, TWIN_LANES);
-    now = model.advanced(now, {cos, sin}, {block.h_s, block.half_h_s, block.sixth_h_s}, none, none, none);
+    now = model.advanced(now, {cos, sin}, {block.h_s, block.half_h_s, block.sixth_h_s}, loads[0], loads[1],
+                         loads[2]);
     const Two size = Many<kCastors>::magnitude(now[kOmega]);
     safe = size[0] + size[1] < kRunaway_rad_s ? safe : V{};
     block.rows[step] = {now[kPosition][0], now[kPosition][1], now[kTurn][0], now[kWheel][0], now[kWheel][1]};
@@ -117,17 +134,19 @@ TWIN_INLINE void run(Block& block, int first, int steps) {
     x[kFirst[i]] = now[i][0];
     if (kSecond[i] >= 0) x[kSecond[i]] = now[i][1];
   }
-  block.diverged = safe == 0.0 ? V{} + 1.0 : V{};
+  block.diverged = safe == 0.0 ? V{} + 1.0 : block.diverged;
 }
 
 }  // namespace
 
-void TWIN_RUN(void* at, int first, int steps) {
+void TWIN_RUN(void* at, int first, int steps, bool loaded) {
   Block& block = *static_cast<Block*>(at);
-  if (any_of(block.castor != 0.0)) {
-    run<true>(block, first, steps);
+  if (loaded) {
+    run<true, Acts::kLoads>(block, first, steps);
+  } else if (any_of(block.castor != 0.0)) {
+    run<true, Acts::kNothing>(block, first, steps);
   } else {
-    run<false>(block, first, steps);
+    run<false, Acts::kNothing>(block, first, steps);
   }
 }
 

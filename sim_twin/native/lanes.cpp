@@ -5,7 +5,7 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "lane_block.hpp"
+#include "lane_seat.hpp"
 
 namespace twin {
 namespace {
@@ -24,7 +24,7 @@ void alone(Leg& leg) {
   guarded(leg, [&] { leg.kernel->advance(leg.t_us); });
 }
 
-// Takes what is not a plain step, until there are plain ones to take or the leg is at its end: returns how many.
+// Takes what is no even step, until there are even ones to take or the leg is at its end: returns how many.
 std::int64_t next_steps(Leg& leg) {
   std::int64_t steps = 0;
   guarded(leg, [&] {
@@ -32,7 +32,7 @@ std::int64_t next_steps(Leg& leg) {
     while (kernel.goes_on(leg.t_us)) {
       kernel.coast(leg.t_us);
       if (!kernel.goes_on(leg.t_us)) return;
-      steps = kernel.plain_steps(leg.t_us);
+      steps = kernel.even_steps(leg.t_us);
       if (steps > 0) return;
       kernel.step();
     }
@@ -50,8 +50,7 @@ class Lanes {
     for (int lane = 0; lane < kWidth; ++lane) fill(lane);
     while (count() > 0) {
       const int steps = run_steps();
-      run_(&block_, row_, steps);
-      row_ += steps;
+      take(steps);
       for (int lane = 0; lane < kWidth; ++lane) {
         if (seats_[lane].leg != nullptr) settle(lane, steps);
       }
@@ -66,6 +65,8 @@ class Lanes {
     Leg* leg = nullptr;
     std::int64_t left = 0;  // steps to be taken before the kernel has to be asked
     int first = 0;          // row of the first that it does not know yet
+    bool loaded = false;    // the lane has loads or a jam
+    double sag_v = 0.0;     // of the battery at the end of the last step
   };
 
   int count() const {
@@ -81,7 +82,24 @@ class Lanes {
     return static_cast<int>(steps);
   }
 
-  // Seats the next leg that has plain steps to take; an empty lane goes on with whatever it holds.
+  void take(int steps) {
+    block_.diverged = V{};
+    const bool loaded = std::any_of(seats_.begin(), seats_.end(),
+                                    [](const Seat& seat) { return seat.leg != nullptr && seat.loaded; });
+    if (!loaded) {
+      run_(&block_, row_, steps, false);
+      row_ += steps;
+      return;
+    }
+    for (const int end = row_ + steps; row_ < end; ++row_) {
+      for (int lane = 0; lane < kWidth; ++lane) {
+        if (seats_[lane].leg != nullptr && seats_[lane].loaded) load_loads(lane);
+      }
+      run_(&block_, row_, 1, true);
+    }
+  }
+
+  // Seats the next leg that has even steps to take; an empty lane goes on with whatever it holds.
   void fill(int lane) {
     Seat& seat = seats_[lane];
     seat.leg = nullptr;
@@ -89,7 +107,9 @@ class Lanes {
       Leg& leg = legs_[order_[next_++]];
       const std::int64_t steps = next_steps(leg);
       if (steps == 0) continue;
-      seat = {&leg, steps, row_ % Block::kRows};
+      seat.leg = &leg;
+      seat.left = steps;
+      seat.first = row_ % Block::kRows;
       load_robot(lane, *leg.kernel);
       load_state(lane, *leg.kernel);
       if (!filled_) spread(lane);
@@ -109,7 +129,7 @@ class Lanes {
     if (seat.left > 0 && row_ < Block::kRows) return;
     Leg& leg = *seat.leg;
     leg.together += row_ - seat.first;
-    guarded(leg, [&] { leg.kernel->follow(track(seat, lane), state(lane)); });
+    guarded(leg, [&] { leg.kernel->follow(track(seat, lane), state(lane), seat.sag_v); });
     seat.first = row_ % Block::kRows;
     if (leg.failed) {
       fill(lane);
@@ -139,24 +159,39 @@ class Lanes {
   }
 
   void load_robot(int lane, const Kernel& kernel) {
-    const Plant& plant = kernel.plant();
-#define X(name) block_.terms.name[lane] = plant.terms().name;
-    TWIN_TERMS(X)
-#undef X
-    const double h_s = 1e-6 * static_cast<double>(kernel.step_us());
-    block_.castor[lane] = plant.castor() ? 1.0 : 0.0;
-    block_.h_s[lane] = h_s;
-    block_.half_h_s[lane] = 0.5 * h_s;
-    block_.sixth_h_s[lane] = h_s / 6.0;
+    seat_robot(block_, lane, kernel.plant(), 1e-6 * static_cast<double>(kernel.step_us()));
   }
 
   void load_state(int lane, const Kernel& kernel) {
-    for (int i = 0; i < kStates; ++i) block_.x[i][lane] = kernel.state()[i];
+    seat_state(block_, lane, kernel.state());
     load_duty(lane, kernel);
   }
 
   void load_duty(int lane, const Kernel& kernel) {
-    for (int side = 0; side < 2; ++side) block_.duty[side][lane] = kernel.drive().duty[side];
+    for (int side = 0; side < 2; ++side) {
+      block_.duty[side][lane] = kernel.drive().duty[side];
+      block_.jam[side][lane] = kernel.drive().jam[side];
+    }
+    if (seats_[lane].loaded) set_loads(lane, {});  // those of before, or of another kernel
+    seats_[lane].loaded = kernel.acted_on();
+    seats_[lane].sag_v = 0.0;
+  }
+
+  void set_loads(int lane, const Kernel::StepLoads& loads) {
+    for (int at = 0; at < 3; ++at) {
+      for (int load = 0; load < kLoads; ++load) block_.loads[at][load][lane] = loads[at][load];
+    }
+  }
+
+  // Of the step that is about to be taken.
+  void load_loads(int lane) {
+    Seat& seat = seats_[lane];
+    const Kernel& kernel = *seat.leg->kernel;
+    if (!kernel.disturbed()) return;  // a jam alone
+    const std::int64_t t_us = kernel.time_us() + (row_ - seat.first) * kernel.step_us();
+    const Kernel::StepLoads loads = kernel.step_loads(t_us, block_.x[kX][lane], block_.x[kY][lane]);
+    set_loads(lane, loads);
+    seat.sag_v = loads[2][kBatterySag];
   }
 
   // What an empty lane computes has to be some robot's motion, for its speed alone.
@@ -204,16 +239,20 @@ std::vector<Width> widths() {
   return out;
 }
 
+void require_width(Width width) {
+  const std::vector<Width> has = widths();
+  if (std::find(has.begin(), has.end(), width) == has.end()) {
+    throw std::invalid_argument("this processor has no registers of that width");
+  }
+}
+
 void advance_together(Leg* legs, std::size_t n) {
   static const Width widest = widths().back();
   advance_together(legs, n, widest);
 }
 
 void advance_together(Leg* legs, std::size_t n, Width width) {
-  const std::vector<Width> has = widths();
-  if (std::find(has.begin(), has.end(), width) == has.end()) {
-    throw std::invalid_argument("this processor has no registers of that width");
-  }
+  require_width(width);
   for (std::size_t i = 0; i < n; ++i) {
     legs[i].failed = nullptr;
     legs[i].together = 0;

@@ -29,4 +29,8 @@ struct Leg {
 void advance_together(Leg* legs, std::size_t n);
 void advance_together(Leg* legs, std::size_t n, Width width);
 
+// Processor time in s that `runs` robots of this kind (a whole number of registers full) take for `steps` steps of
+// 1e-4 s each, driving under duties that change every 4 ms, without boards: the plant's share of the above.
+double plant_lane_time(const PlantParams& params, Width width, int runs, int steps);
+
 }  // namespace twin

@@ -2,8 +2,6 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/vector.h>
 
-#include <chrono>
-#include <ctime>
 #include <stdexcept>
 #include <vector>
 
@@ -53,5 +51,11 @@ nb::list advance_together(const std::vector<Kernel*>& kernels, const std::vector
 
 void bind_lanes(nb::module_& m) {
   m.def("lane_widths", &lane_widths);
+  m.def(
+      "plant_lane_time",
+      [](const twin::PlantParams& params, int lanes, int runs, int steps) {
+        return twin::plant_lane_time(params, static_cast<Width>(lanes), runs, steps);
+      },
+      "params"_a, "lanes"_a, "runs"_a, "steps"_a);
   m.def("advance_together", &advance_together, "kernels"_a, "t_us"_a, "lanes"_a = 0);
 }

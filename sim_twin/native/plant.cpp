@@ -67,8 +67,9 @@ TWIN_INLINE StateVector listed(const OneState& x) {
 
 void headings(const double* theta_rad, double* cos, double* sin, int n) {
   for (int i = 0; i < n; ++i) {
-    cos[i] = std::cos(theta_rad[i]);
-    sin[i] = std::sin(theta_rad[i]);
+    const double at_rad = theta_rad[i];  // both of one number: the compiler has them worked out in one call
+    cos[i] = std::cos(at_rad);
+    sin[i] = std::sin(at_rad);
   }
 }
 
