@@ -18,7 +18,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -138,6 +137,8 @@ class MarkSearch:
 
 def _halved(picture: Image) -> Image:
     """Return a picture of half the size; an odd last row or column falls away."""
+    import cv2  # noqa: PLC0415 - a tenth of a second, where there are pictures only
+
     size = (picture.shape[1] // 2, picture.shape[0] // 2)
     even = picture[: 2 * size[1], : 2 * size[0]]
     return np.asarray(cv2.resize(even, size, interpolation=cv2.INTER_AREA), np.uint8)

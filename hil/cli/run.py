@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +30,7 @@ from hil.cli.progress import run_progress
 from hil.core.text import visible
 
 if TYPE_CHECKING:
+    from hil.record.beside import ViewerFile
     from hil.record.reader import RunRecord
     from hil.runs.parts import Publish
 
@@ -79,40 +80,39 @@ def command(
 
     Built in: scenario-1, scenario-2, scenario-3 (the three experiments) and circle (section 8.9).
     """
-    from hil.config.load import load_scenario
-    from hil.core.registries import OUTER_LAWS
-    from hil.record.beside import ViewerFile
-    from hil.record.manifest import command_line
-    from hil.rigs.key_file import read_key
-    from hil.runs.execute import RunSpec, camera_for, execute, exit_status, new_folder
-
     if record_camera and small_video:
         raise click.UsageError("--record-camera and --record-camera-small: choose one")
-    law = OUTER_LAWS.get(outer) if outer else None
-    resolved = load_scenario(scenario, with_figures(overrides, own_figures))
-    law = law or OUTER_LAWS.get(resolved.control.outer)
-    spec = RunSpec(
-        scenario=resolved,
-        target=target,
-        camera=camera_for(resolved, target, camera),
-        outer=law.name,
-        inner=inner,
-        seed=seed,
-        out=out or new_folder(f"{resolved.name}-{law.name}"),
-        record_camera=record_camera,
-        small_video=small_video,
-        command=command_line(),
-        key=read_key(key_file) if key_file else None,
-    )
-    with (
-        ViewerFile() if spec.is_simulated else nullcontext() as viewer,
-        junit_file(junit, f"{resolved.name}.{law.name}"),
-        run_progress({resolved.name: resolved.duration_s}) as update,
-        _ground_stations(bridge) as publish,
-    ):
-        record = execute(
-            spec, lambda t_s: update(resolved.name, t_s), publish=publish, viewer=viewer
+    with _viewer_file(target) as viewer:
+        from hil.config.load import load_scenario
+        from hil.core.registries import OUTER_LAWS
+        from hil.record.manifest import command_line
+        from hil.rigs.key_file import read_key
+        from hil.runs.execute import RunSpec, camera_for, execute, exit_status, new_folder
+
+        law = OUTER_LAWS.get(outer) if outer else None
+        resolved = load_scenario(scenario, with_figures(overrides, own_figures))
+        law = law or OUTER_LAWS.get(resolved.control.outer)
+        spec = RunSpec(
+            scenario=resolved,
+            target=target,
+            camera=camera_for(resolved, target, camera),
+            outer=law.name,
+            inner=inner,
+            seed=seed,
+            out=out or new_folder(f"{resolved.name}-{law.name}"),
+            record_camera=record_camera,
+            small_video=small_video,
+            command=command_line(),
+            key=read_key(key_file) if key_file else None,
         )
+        with (
+            junit_file(junit, f"{resolved.name}.{law.name}"),
+            run_progress({resolved.name: resolved.duration_s}) as update,
+            _ground_stations(bridge) as publish,
+        ):
+            record = execute(
+                spec, lambda t_s: update(resolved.name, t_s), publish=publish, viewer=viewer
+            )
     tell_ci([record], f"hil run {resolved.name}", junit=junit)
     if as_json:
         print_json(summary(record))
@@ -123,6 +123,14 @@ def command(
 
         click.echo(visible(open_viewer([record.path])), err=True)
     return exit_status(record)
+
+
+def _viewer_file(target: str) -> AbstractContextManager[ViewerFile | None]:
+    """Give the process beside the run; once it is entered, that and the command load side by side."""
+    from hil.record.beside import ViewerFile
+    from hil.rigs.opening import is_simulated
+
+    return ViewerFile() if is_simulated(target) else nullcontext()
 
 
 @contextmanager

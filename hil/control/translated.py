@@ -23,6 +23,7 @@ from typing import Any
 from hil.control import AsgIsm as AsgBlock
 from hil.control import _outer
 from hil.control.laws.asg_ism import AsgIsm
+from hil.control.laws.axes import TurnedAxes
 from hil.control.laws.chain import Chain
 from hil.control.laws.guard import GuardedLaw
 from hil.control.laws.hold import HoldAtGoal
@@ -35,7 +36,8 @@ from hil.core import _native as core_native
 
 _ROOT = Path(__file__).parents[2]
 # What a module or a class has that native code has taken over.
-_TAKEN = (FunctionType, staticmethod, classmethod, property, type, int, float, tuple)
+_CACHED = type(cache(lambda: None))
+_TAKEN = (FunctionType, _CACHED, staticmethod, classmethod, property, type, int, float, tuple)
 
 
 def _owners() -> list[Any]:
@@ -66,7 +68,12 @@ _PARTS = [
     for owner in _owners()
     if (taken := _taken(owner))
 ]
-_FUNCTIONS = [v for _, _, values in _PARTS for v in values if isinstance(v, FunctionType)]
+_FUNCTIONS = [
+    function
+    for _, _, values in _PARTS
+    for value in values
+    if isinstance(function := getattr(value, "__wrapped__", value), FunctionType)
+]
 _CODES = [function.__code__ for function in _FUNCTIONS]
 
 
@@ -137,13 +144,20 @@ def native_law(law: object, own_terms: tuple[str, ...] = ()) -> _outer.OuterLaw 
 def _law(law: Any, own_terms: tuple[str, ...], stand_in: StandIn | None = None) -> _outer.OuterLaw:
     kind = type(law)
     around = _AROUND.get(kind)
-    if around is not None and _is_plain(law):
+    if around is not None and _is_plain(law) and (kind is not TurnedAxes or _is_known(law)):
         return around(_law(law._law, own_terms, stand_in), law)
     if is_translated(law):
         return _outer.law(kind.__name__, law._gains, law._limits, law._d0)
     if stand_in is not None and kind is GuardedLaw and law.makes_batches:
         return stand_in(law)
     return _outer.python_law(law, own_terms)
+
+
+def _is_known(law: Any) -> bool:
+    """Say whether axes are turned for a translated law: another's own terms are turned in Python."""
+    while type(law) in _AROUND:
+        law = law._law
+    return is_translated(law)
 
 
 def is_translated(law: Any) -> bool:
@@ -160,6 +174,7 @@ def _geometry(law: Any) -> Any:
 
 
 _AROUND: dict[type, Callable[[_outer.OuterLaw, Any], _outer.OuterLaw]] = {
+    TurnedAxes: lambda inner, law: _outer.turned_axes(inner, law._angle_rad),
     HoldAtGoal: lambda inner, law: _outer.hold_at_goal(inner, law._enter, law._leave),
     WithinWheelSpeed: lambda inner, law: _outer.within_wheel_speed(
         inner, _geometry(law), law._omega_max_rad_s

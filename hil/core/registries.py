@@ -64,3 +64,8 @@ def source_digests(names: Sequence[str], registry: Registry = OUTER_LAWS) -> dic
     """Return the digest of the text of each thing (an outer law) among `names` that came from a file."""
     entries = [registry.get(name) for name in names]
     return {entry.name: entry.source.sha256 for entry in entries if entry.source is not None}
+
+
+def law_colour(name: str) -> str:
+    """Return the colour of an outer law as #rrggbb, "" for one that has none or is not known."""
+    return next((entry.colour for entry in OUTER_LAWS.entries() if entry.name == name), "")

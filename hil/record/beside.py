@@ -3,6 +3,8 @@
 Loading that code takes a third of a short run's time, and nothing of the run depends on it: a fork of this
 process does it on another core, waits for the finished tables, and writes `run.rrd` from them. Where that
 process cannot be had, or has gone away, the file is written here as ever.
+
+This module loads what both processes need, and a command enters it before it loads the rest.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from hil.record.reader import RunRecord
 
 _DONE = b"done"
-_END = b"\0"  # of a folder's name, which may have any other byte
+_END = b"\0"  # of a folder's name, which may have any other byte; the colour of the run's law goes before it
 _NAME_BYTES = 65_536
 _ANSWER_BYTES = 4096
 
@@ -71,7 +73,7 @@ class ViewerFile:
 
     def write(self, run: RunRecord) -> None:
         """Write the file of a run whose tables are finished; raises OSError."""
-        said = self._asked(run.path) if self._pid else b""
+        said = self._asked(run) if self._pid else b""
         if said == _DONE:
             return
         number, _, text = said.partition(b" ")
@@ -81,10 +83,13 @@ class ViewerFile:
 
         write_rrd(run.path / layout.RERUN, [run])
 
-    def _asked(self, folder: Path) -> bytes:
+    def _asked(self, run: RunRecord) -> bytes:
         """Return the other process's answer, b"" where it has gone away."""
+        from hil.core.registries import law_colour  # noqa: PLC0415 - the other process does without the laws
+
+        colour = law_colour(run.manifest.outer).encode()
         with suppress(BrokenPipeError):
-            os.write(self._ask, os.fsencode(folder.absolute()) + _END)
+            os.write(self._ask, colour + b" " + os.fsencode(run.path.absolute()) + _END)
             return os.read(self._answer, _ANSWER_BYTES)
         return b""
 
@@ -107,17 +112,18 @@ def _serve(asked: int, told: int) -> NoReturn:
         while piece := os.read(asked, _NAME_BYTES):
             heard += piece
             if heard.endswith(_END):
-                folder = Path(os.fsdecode(heard.removesuffix(_END)))
-                os.write(told, _written(write_rrd, folder)[:_ANSWER_BYTES])
+                colour, _, folder = heard.removesuffix(_END).partition(b" ")
+                done = _written(write_rrd, Path(os.fsdecode(folder)), colour.decode())
+                os.write(told, done[:_ANSWER_BYTES])
                 heard = b""
     except BaseException:
         pass
     os._exit(0)
 
 
-def _written(write_rrd: Any, folder: Path) -> bytes:
+def _written(write_rrd: Any, folder: Path, colour: str) -> bytes:
     try:
-        write_rrd(folder / layout.RERUN, [read_run(folder)])
+        write_rrd(folder / layout.RERUN, [read_run(folder)], lambda _law: colour)
     except OSError as error:
         return f"{error.errno or 5} {error.strerror or error}".encode()
     return _DONE

@@ -10,13 +10,12 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import cv2
-
 from hil.core.errors import RecordFault
 from hil.core.rig import whole
 from hil.record.reader import picture_name
 
 if TYPE_CHECKING:
+    import cv2
     import numpy as np
     from numpy.typing import NDArray
 
@@ -81,11 +80,15 @@ class CameraKeeper:
             raise RecordFault(self.error)
 
     def _work(self) -> None:
-        while (item := self._queue.get()) is not None:
+        item = self._queue.get()
+        if item is not None:
+            import cv2  # noqa: PLC0415 - a tenth of a second, where there are pictures only
+        while item is not None:
             try:
                 self._work_on(*item)
             except cv2.error as error:  # the control loop must not wait for a thread that has died
                 self.error = self.error or f"pictures: {' '.join(str(error).split())}"
+            item = self._queue.get()
         if self._writer is not None:
             self._writer.release()
 
@@ -96,11 +99,15 @@ class CameraKeeper:
             self._write_video(self._video_path, image)
 
     def _keep(self, t_s: float, image: Image) -> None:
+        import cv2  # noqa: PLC0415 - as above
+
         path = self._folder / picture_name(t_s)
         if not cv2.imwrite(str(path), image, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]):
             self.error = self.error or f"{path}: the picture cannot be written; disk full?"
 
     def _write_video(self, path: Path, image: Image) -> None:
+        import cv2  # noqa: PLC0415 - as above
+
         if self._writer is None:
             height, width = image.shape[:2]
             small = path.suffix == ".avi"

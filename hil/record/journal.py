@@ -135,21 +135,33 @@ def arrow_table(columns: Columns, schema: Sequence[Column]) -> pa.Table:
 
 
 def _arrow_array(values: NDArray[np.float64], column: Column) -> pa.Array:
+    # From buffers: pa.array() has to look at masks of numpy's, whose code takes longer to load than this.
     missing = np.isnan(values)
+    known = pa.py_buffer(_bits(~missing)) if missing.any() else None
     if column.kind == "float64":
-        return pa.array(values, pa.float64(), mask=missing)
+        data = pa.py_buffer(np.ascontiguousarray(values, np.float64))
+        return pa.Array.from_buffers(pa.float64(), len(values), [known, data])
     whole = np.where(missing, 0.0, values)
-    target = np.bool_ if column.kind == "bool" else np.int32
-    return pa.array(whole.astype(target), mask=missing)
+    if column.kind == "bool":
+        data = pa.py_buffer(_bits(whole != 0.0))
+        return pa.Array.from_buffers(pa.bool_(), len(values), [known, data])
+    data = pa.py_buffer(whole.astype(np.int32))
+    return pa.Array.from_buffers(pa.int32(), len(values), [known, data])
+
+
+def _bits(flags: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    return np.packbits(flags, bitorder="little")
 
 
 def read_parquet(path: Path) -> Columns:
     """Return every column as float64, NaN where the file has null; raises BadInput."""
     try:
-        whole = ColumnsOnDisk(path)
-        if whole.rows > GROUP_ROWS:
-            return whole
-        table = pq.read_table(path)
+        with pq.ParquetFile(
+            path
+        ) as file:  # pq.read_table loads code for tables of many files first
+            if file.metadata.num_rows > GROUP_ROWS:
+                return ColumnsOnDisk(path)
+            table = file.read()
         return {name: _floats(table.column(name)) for name in table.column_names}
     except _UNREADABLE as error:
         raise _damaged(path, error) from None

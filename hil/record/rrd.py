@@ -8,7 +8,7 @@ seen from above). Times are seconds since the first tick of the controlled part;
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,7 +20,7 @@ import rerun.blueprint as rrb
 from hil.analysis import metrics
 from hil.analysis.pieces import PIECE_ROWS, pieces, row_count
 from hil.core.files import replacing
-from hil.core.registries import OUTER_LAWS
+from hil.core.registries import law_colour
 from hil.core.text import visible
 from hil.record.reader import RunRecord
 from hil.record.rrd_file import Put, written_by
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     Times = Array | list[float]
 
 Colour = tuple[int, int, int]
+ColourOf = Callable[[str], str]  # of a law by its name: #rrggbb, or ""
 TIMELINE = "t"
 APPLICATION = "skid-steer-hil"
 _BODY_M = (0.15, 0.2166, 0.06)  # thesis Table 8.3: length, width; height is for the eye only
@@ -106,23 +107,27 @@ def own_plots(run: RunRecord) -> tuple[Plot, ...]:
 _MAIN_PLOTS = ("error", "sliding", "wheels", "latency")
 
 
-def write_rrd(path: Path, runs: Sequence[RunRecord]) -> None:
+def write_rrd(path: Path, runs: Sequence[RunRecord], colour_of: ColourOf = law_colour) -> None:
     """Write the runs to one Rerun file, atomically; the first run's name titles the recording."""
     names = entity_names(runs)
     recording = rr.RecordingStream(APPLICATION, recording_id=_recording_id(runs))
     with replacing(path) as part, written_by(recording, part) as put:
         recording.send_blueprint(blueprint(runs, names), make_active=False)
         recording.send_recording_name(" and ".join(names))
-        _send_all(recording, runs, names, put)
+        _send_all(recording, runs, names, colour_of, put)
 
 
 def _send_all(
-    recording: rr.RecordingStream, runs: Sequence[RunRecord], names: Sequence[str], put: Put
+    recording: rr.RecordingStream,
+    runs: Sequence[RunRecord],
+    names: Sequence[str],
+    colour_of: ColourOf,
+    put: Put,
 ) -> None:
     one_scenario = len({run.manifest.scenario_name for run in runs}) == 1
     legends = [f"{name.rpartition('/')[2] if one_scenario else name} " for name in names]
     for index, (name, run) in enumerate(zip(names, runs, strict=True)):
-        colour = _colour(run, index, runs)
+        colour = _colour(run, index, runs, colour_of)
         prefix, lines = ("", _LINE_COLOURS) if len(runs) == 1 else (legends[index], _shades(colour))
         _Sender(recording, name, run, colour, put).send(_LineStyle(prefix, lines))
 
@@ -140,10 +145,10 @@ def _recording_id(runs: Sequence[RunRecord]) -> str:
     return "-".join(f"{run.manifest.start_unix_us:x}" for run in runs)
 
 
-def _colour(run: RunRecord, index: int, runs: Sequence[RunRecord]) -> Colour:
+def _colour(run: RunRecord, index: int, runs: Sequence[RunRecord], colour_of: ColourOf) -> Colour:
     """Return the colour of the law, or a distinct one when two runs have the same law."""
     laws = [other.manifest.outer for other in runs]
-    own = {entry.name: entry.colour for entry in OUTER_LAWS.entries()}.get(run.manifest.outer)
+    own = colour_of(run.manifest.outer)
     if own and laws.count(run.manifest.outer) == 1:
         return int(own[1:3], 16), int(own[3:5], 16), int(own[5:7], 16)
     return _OTHER_COLOURS[index % len(_OTHER_COLOURS)]

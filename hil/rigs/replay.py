@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NoReturn
 
-import cv2
 import numpy as np
 
 from hil.config.mismatch import true_robot
@@ -205,6 +204,8 @@ def _covariance(values: dict[str, float]) -> Covariance | None:
 
 def recorded_images(path: Path) -> Iterator[NDArray[np.uint8]]:
     """Yield the images of a lossless video, as far as it can be read."""
+    import cv2  # noqa: PLC0415 - a tenth of a second, where there is a video only
+
     video = cv2.VideoCapture(str(path))
     try:
         while True:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-import cv2
-
 from hil.config.fit import board_parameters, check_fit
 from hil.control.laws.making import law_and_gains, make_law
 from hil.core.registry import in_one_line
@@ -76,7 +74,7 @@ def execute(
     estimate of every tick, `watch` everything that the record is given, after it; `orders` are an operator's.
     `viewer` writes the viewer's file, beside the run where it has been entered.
     """
-    cv2.setNumThreads(1)  # search windows are small: handing them to threads costs more
+    _one_thread(spec)
     parameters, used, manifest = checked(spec)
     law, live = law_and_gains(spec.outer, spec.scenario, live=orders is not None)
     rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed, spec.key)
@@ -122,6 +120,15 @@ def execute(
         return record
     finally:
         rig.close()
+
+
+def _one_thread(spec: RunSpec) -> None:
+    """Have OpenCV search in one thread: windows are small, and handing them to threads costs more."""
+    if spec.is_simulated and spec.camera == "pose":
+        return
+    import cv2  # noqa: PLC0415 - a tenth of a second, where there are pictures only
+
+    cv2.setNumThreads(1)
 
 
 def _conducted(

@@ -12,7 +12,7 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -314,7 +314,7 @@ def case_scenario(case: Case, gains: Gains, task: Scenario | None = None) -> Sce
 
     `task` is what the case names, the built-in scenario when it is not given.
     """
-    scenario = task or load_scenario(case.scenario)
+    scenario = task or _shipped(case.scenario)
     sets = scenario.control.gains.model_copy(update={"tuned": gains})
     control = scenario.control.model_copy(update={"gains": sets, "gain_set": "tuned"})
     changed: dict[str, object] = {"control": control}
@@ -328,9 +328,20 @@ def case_scenario(case: Case, gains: Gains, task: Scenario | None = None) -> Sce
     return scenario.model_copy(update=changed)
 
 
+@cache
+def _shipped(name: str) -> Scenario:
+    """Return a built-in scenario: a search asks for it in each of its runs."""
+    return load_scenario(name)
+
+
+@cache
+def _pushed_robot() -> RobotConfig:
+    return load_robot(PUSHED_ROBOT)
+
+
 def _pushes(robot: RobotConfig) -> tuple[Disturbance, ...]:
     """Return PUSHES for a robot of another size: force by its weight, twist by weight and track."""
-    usual = load_robot(PUSHED_ROBOT)
+    usual = _pushed_robot()
     weight = robot.mass_kg / usual.mass_kg
     ratios = (weight, weight * robot.track_m / usual.track_m)
     return tuple(

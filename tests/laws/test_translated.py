@@ -19,7 +19,7 @@ from hil.config.control import (
 )
 from hil.config.load import load_scenario
 from hil.control import _outer, translated
-from hil.control.laws import chain, let_go
+from hil.control.laws import axes, chain, let_go
 from hil.control.laws.asg_ism import AsgIsm
 from hil.control.laws.hold import HoldAtGoal
 from hil.control.laws.let_go import LetGo
@@ -76,10 +76,11 @@ def gains_of(law, p, cost, start):
     return shipped.asg_ism.model_copy(update=more)
 
 
-def stacked(law, gains, limits, within_rad_s=9.0):
+def stacked(law, gains, limits, within_rad_s=9.0, axes_rad=0.0):
     """Return a law under all that holds for every law."""
     inner = (StateFeedback if law == "pid" else AsgIsm)(gains, limits, D0_M)
-    bounded = WithinWheelSpeed(HoldAtGoal(inner, limits), VEHICLE, within_rad_s)
+    held = axes.in_axes(HoldAtGoal(inner, limits), axes_rad)
+    bounded = WithinWheelSpeed(held, VEHICLE, within_rad_s)
     turning = TurnFirst(bounded, limits.turn_missing_rad_s)
     return LetGo(turning, VEHICLE, limits.let_go_rad_s)
 
@@ -128,12 +129,15 @@ def unequal(law, twin, steps):
     cost=st.sampled_from(["sum", "norm"]),
     start=st.none() | st.floats(0.0, 1.0),
     within_rad_s=st.floats(1.0, 12.0),
+    axes_rad=st.just(0.0) | st.floats(-3.2, 3.2),
 )
-def test_a_native_law_is_its_python_source(law, limits, steps, *, p, cost, start, within_rad_s):
-    """Commands and traces are equal to the bit, whatever limits, gains and steps are drawn."""
-    made = stacked(law, gains_of(law, p, cost, start), limits, within_rad_s)
+def test_a_native_law_is_its_python_source(
+    law, limits, steps, *, p, cost, start, within_rad_s, axes_rad
+):
+    """Commands and traces are equal to the bit, whatever limits, gains, axes and steps are drawn."""
+    made = stacked(law, gains_of(law, p, cost, start), limits, within_rad_s, axes_rad)
     twin = translated.native_law(made)
-    assert translated.is_translated(made._law._law._law._law)
+    assert translated._is_known(made)
     assert unequal(made, twin, steps) == []
 
 
@@ -169,6 +173,26 @@ def test_a_native_reference_is_its_python_source(kind, times):
         state = reference.at(t_s)
         of = (state.z1_m, state.z1_dot_m_s, state.z1_ddot_m_s2, state.z1_dddot_m_s3)
         assert [bits(v) for v in twin.at(t_s)] == [bits(v) for v in of]
+
+
+def test_the_comparison_sees_axes_turned_by_one_bit_more():
+    """The same for the angle of a law's axes (negative control)."""
+    gains, limits = gains_of("asg-ism", 1.0, "sum", None), OuterLimits()
+    twin = translated.native_law(stacked("asg-ism", gains, limits, axes_rad=0.7))
+    other = stacked("asg-ism", gains, limits, axes_rad=math.nextafter(0.7, 1.0))
+    step = {
+        "x": 0.0, "y": 0.1, "theta": 0.4, "eta1": 0.2, "w": 0.1, "z3": (0.1, 0.2), "sides": (0, 0),
+        "hard": False, "near": False, "moving": True, "rates": ((0.1, 0.2), (0.3, 0.1), (0.2, 0.4)),
+    }  # fmt: skip
+    steps = [step | {"x": 0.05 * k} for k in range(8)]
+    assert unequal(stacked("asg-ism", gains, limits, axes_rad=0.7), twin, steps) == []
+    assert unequal(other, twin, steps) != []
+
+
+def test_axes_of_a_law_that_is_not_translated_are_turned_in_python():
+    """Its trace may have vectors of its own, which native code does not know."""
+    assert not translated._is_known(axes.in_axes(shipped(Derived), 0.7))
+    assert translated._is_known(axes.in_axes(shipped(), 0.7))
 
 
 class Derived(AsgIsm):
@@ -271,6 +295,9 @@ def test_the_vehicle_is_among_the_sources_that_are_looked_at():
         (chain, "clip", lambda value, _: value),
         (chain, "Chain", type("Chain", (), {})),
         (let_go, "_WAIT_S", 0.5),
+        (axes, "_pairs", lambda _: ()),
+        (axes._pairs.__wrapped__, "__code__", (lambda _: ()).__code__),
+        (axes.TurnedAxes, "_back", lambda _, trace: trace),
         (TurnFirst, "_wanted_share", staticmethod(lambda *_: 0.5)),
         (TwoSided, "wheels", lambda *_: (0.0, 0.0)),
         (chain.clip, "__code__", (lambda value, limit: value * limit).__code__),

@@ -59,6 +59,7 @@ CASES = st.fixed_dictionaries(
         "loss": st.sampled_from([0.0, 0.05]),
         "corruption": st.sampled_from([0.0, 0.002]),
         "drop": st.sampled_from([0.0, 0.2]),
+        "axes": st.sampled_from([0.0, 0.7]),
         "seed": st.integers(0, 10_000),
     }
 )
@@ -70,6 +71,7 @@ ONE = {
     "loss": 0.0,
     "corruption": 0.0,
     "drop": 0.0,
+    "axes": 0.0,
     "seed": 3,
 }
 
@@ -81,6 +83,7 @@ def spec_of(case):
         f"link.loss_ratio={case['loss']}",
         f"link.corruption_ratio={case['corruption']}",
         f"camera.drop_ratio={case['drop']}",
+        f"control.axes_rad={case['axes']}",
     ]
     if case["fault"] != "none":
         more = FAULTS[case["fault"]]

@@ -20,7 +20,6 @@ from hil.config.camera import CameraConfig, TagConfig
 from hil.core.registries import LOCALISERS
 from hil.core.types import Pose, PoseMeasurement, wrap_pi
 from hil.core.wording import past
-from vision import cv_compat
 from vision.camera import CameraModel, longest_px
 from vision.camera_setup import camera_model
 from vision.pose_fit import fit_pose
@@ -66,6 +65,8 @@ class TagLocaliser:
     """Finds one tag, known by dictionary and number, at a known height over the floor."""
 
     def __init__(self, camera: CameraModel, tag: TagConfig, height_m: float) -> None:
+        from vision import cv_compat  # noqa: PLC0415 - loads OpenCV, where there are pictures only
+
         self._camera = camera
         self._tag = tag
         self._height_m = height_m
@@ -133,6 +134,8 @@ class TagLocaliser:
         self, image: Image, window: Window, predicted: Pose | None, radius_m: float
     ) -> PoseMeasurement:
         """Return the tag seen in the window; near the prediction if there is one."""
+        from vision import cv_compat  # noqa: PLC0415 - loads OpenCV, where there are pictures only
+
         u0, v0, u1, v1 = window
         level = cv_compat.grey(image[v0:v1, u0:u1])
         ours = self._corners(level) + np.array([u0, v0])
@@ -150,6 +153,8 @@ class TagLocaliser:
 
     def _corners(self, level: Image) -> Array:
         """Return the corner pixels, (N, 4, 2), of every tag with our number."""
+        from vision import cv_compat  # noqa: PLC0415 - loads OpenCV, where there are pictures only
+
         side_px = self._tag.size_m / self._scale_m_px(self._middle)
         enlarge = 2 if side_px < SIDE_READABLE_PX else 1
         detector = cv_compat.tag_detector(self._tag.dictionary, side_px, max(level.shape))

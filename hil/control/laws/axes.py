@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from random import Random
 from typing import TYPE_CHECKING
 
@@ -55,24 +56,33 @@ class TurnedAxes:
     def _estimate(self, estimate: Estimate) -> Estimate:
         pose, z3 = estimate.pose, estimate.z3_m_s2
         x, y = self._into((pose.x_m, pose.y_m))
-        return replace(
+        turned = replace(
             estimate,
             pose=Pose(x, y, pose.theta_rad - self._angle_rad),
             z1_m=self._into(estimate.z1_m),
             z2_m_s=self._into(estimate.z2_m_s),
-            z3_m_s2=None if z3 is None else self._into(z3),
         )
+        return turned if z3 is None else replace(turned, z3_m_s2=self._into(z3))
 
     def _back(self, trace: Mapping[str, float]) -> dict[str, float]:
         """Return the trace with each pair of terms NAME_x..., NAME_y... in the axes of the world."""
         found = dict(trace)
-        for name, x in trace.items():
-            other = name.replace("_x_", "_y_") if "_x_" in name else f"{name[:-1]}y"
-            if ("_x_" in name or name.endswith("_x")) and other in trace:
-                y = trace[other]
-                found[name] = self._cos * x - self._sin * y
-                found[other] = self._sin * x + self._cos * y
+        for name, other in _pairs(tuple(trace)):
+            x, y = trace[name], trace[other]
+            found[name] = self._cos * x - self._sin * y
+            found[other] = self._sin * x + self._cos * y
         return found
+
+
+@cache
+def _pairs(names: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+    """Return which terms of a trace are X and Y of one vector."""
+    found = []
+    for name in names:
+        other = name.replace("_x_", "_y_") if "_x_" in name else f"{name[:-1]}y"
+        if ("_x_" in name or name.endswith("_x")) and other in names:
+            found.append((name, other))
+    return tuple(found)
 
 
 def in_axes(law: OuterLaw, angle_rad: float) -> OuterLaw:

@@ -73,6 +73,18 @@ class Scope:
                 yield f"for (int {name} = 0; {name} < {self.of(end)}; ++{name}) {{"
                 yield from (line.removeprefix(indent) for line in self.block(body, indent + "  "))
                 yield "}"
+            case ast.For(
+                target=ast.Tuple(elts=[ast.Name(id=one), ast.Name(id=other)]),
+                iter=ast.Call(
+                    func=ast.Name(id=pairs),
+                    args=[ast.Call(func=ast.Name(id="tuple"), args=[ast.Name(id=trace)])],
+                ),
+                body=body,
+            ) if pairs == self._program.pairs:
+                yield f"for (const auto& [{one}, {other}] : k_pairs) {{"
+                yield f"  if (!{trace}.has({one}) || !{trace}.has({other})) continue;"
+                yield from (line.removeprefix(indent) for line in self.block(body, indent + "  "))
+                yield "}"
             case _:
                 raise NotUnderstoodError(f"line {node.lineno}: {ast.unparse(node)}")
 
@@ -101,6 +113,8 @@ class Scope:
                 yield f"auto {name} = {text};"
             case ast.Attribute():
                 yield f"{self.of(target)} = {text};"
+            case ast.Subscript(value=value, slice=ast.Name(id=key)):
+                yield f"{self.of(value)}.set({key}, {text});"
             case ast.Tuple():
                 yield from self._unpack(target, text)
             case _:
@@ -207,6 +221,11 @@ class Scope:
                 signature = self._program.functions[name]
                 inside, whole = self._arguments(node, signature), self._program.owners[name] + name
                 return f"{whole}{{{inside}}}" if signature.is_struct else f"{whole}({inside})"
+            case ast.Name(id="dict"):
+                return f"Trace({self.of(node.args[0])})"
+            case ast.Name(id="replace"):
+                changed = " ".join(f"made.{w.arg} = {self.of(w.value)};" for w in node.keywords)
+                return f"[&] {{ auto made = {self.of(node.args[0])}; {changed} return made; }}()"
             case ast.Name(id="float"):
                 return f"static_cast<double>({self.of(node.args[0])})"
             case ast.Name(id="abs" | "max" | "min" | "len" | "bisect_right" as name):

@@ -15,6 +15,7 @@ _TYPES = {
     "str": "std::string",
     "Vec2": "Vec2",
     "dict[str, float]": "Trace",
+    "Mapping[str, float]": "Trace",
     "Sequence[float]": "Vec2",
     "list[float]": "std::vector<double>",
     "_Poly": "std::vector<double>",
@@ -35,6 +36,7 @@ class Part:
     names: tuple[str, ...]
     members: Mapping[str, tuple[tuple[str, str], ...]] = field(default_factory=dict)
     leave: tuple[str, ...] = ()  # methods that a run does not call
+    pairs: str = ""  # a function that says which keys of a trace go together: asked once, here
 
 
 class NotUnderstoodError(Exception):
@@ -61,6 +63,7 @@ class Program:
     owners: dict[str, str] = field(default_factory=dict)  # functions and classes: their namespaces
     mutable: set[str] = field(default_factory=set)  # classes with a state
     keys: list[str] = field(default_factory=list)  # of traces
+    pairs: str = ""  # the function of a Part that pairs them
 
 
 def cpp_name(name: str) -> str:

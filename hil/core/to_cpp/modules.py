@@ -6,6 +6,7 @@ import ast
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from hil.core.to_cpp.bodies import Scope
 from hil.core.to_cpp.kinds import (
@@ -121,6 +122,7 @@ class Translation:
         space = "in_" + Path(part.path).stem
         yield f"\nnamespace {space} {{  // {part.path}"
         yield from self._constants(tree)
+        yield from self._paired(part, tree)
         found = {
             node.name: node
             for node in tree.body
@@ -154,6 +156,20 @@ class Translation:
         for name in found:
             yield f"using {space}::{name};"
         yield self._behind.get(part.path, "")
+
+    def _paired(self, part: Part, tree: ast.Module) -> Iterator[str]:
+        """Yield which keys of a trace go together, of all that there are by now, as the source says it."""
+        self.program.pairs = part.pairs
+        if not part.pairs:
+            return
+        (node,) = (f for f in tree.body if isinstance(f, ast.FunctionDef) and f.name == part.pairs)
+        node.decorator_list = []
+        space: dict[str, Any] = {}
+        exec(compile(ast.Module([node], []), part.path, "exec"), space)
+        keys = self.program.keys
+        found = [(keys.index(a), keys.index(b)) for a, b in space[part.pairs](tuple(keys))]
+        inside = ", ".join(f"{{{one}, {other}}}" for one, other in found)
+        yield f"constexpr std::pair<std::size_t, std::size_t> k_pairs[] = {{{inside}}};"
 
     def _constants(self, tree: ast.Module) -> Iterator[str]:
         """Yield the module's numbers and pairs of numbers."""
@@ -263,6 +279,8 @@ class Translation:
                 return "Trace"
             case ast.Name(id=name):
                 return known.get(name) or self.program.constants[name]
+            case ast.Call(func=ast.Attribute(value=ast.Name(id="math"))):
+                return "double"
             case ast.Call(func=ast.Name(id=name)) if name in self.program.mutable:
                 return name
             case ast.Call(func=ast.Name(id=name)) if name in self.program.functions:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from hil.config.mismatch import true_robot
 from hil.core.errors import BadInput
 from hil.core.registries import TARGETS
 from hil.core.types import Pose
@@ -50,6 +49,7 @@ def _signed(rig: Rig, asked: Asked) -> Rig:
 def twin_setup(scenario: Scenario, seed: int, key: Key | None = None) -> Any:
     """Return what the simulated rig is made of; its board's storage holds the `key`."""
     from hil.board._firmware import stored_key  # noqa: PLC0415
+    from hil.config.mismatch import true_robot  # noqa: PLC0415 - so that targets are known early
     from sim_twin.twin import TwinSetup  # noqa: PLC0415
 
     start = scenario.start

@@ -151,6 +151,12 @@ void bind_laws(nb::module_& m) {
       },
       nb::keep_alive<0, 1>(), "law"_a, "missing_rad_s"_a.none());
   m.def(
+      "turned_axes",
+      [](OuterLaw& law, double angle_rad) -> Law {
+        return std::make_unique<outer::TurnedAxes>(outer::AnyLaw{&law}, angle_rad);
+      },
+      nb::keep_alive<0, 1>(), "law"_a, "angle_rad"_a);
+  m.def(
       "let_go",
       [](OuterLaw& law, nb::handle geometry, nb::handle least_rad_s) -> Law {
         return std::make_unique<outer::LetGo>(outer::AnyLaw{&law}, taken<outer::BelievedGeometry>(geometry),

@@ -146,15 +146,19 @@ constexpr std::size_t kTraceSlots = 32;  // with those of a law of somebody's ow
 class Trace {
  public:
   Trace&& with(std::size_t key, double value) && {
-    values_[key] = value;
-    has_ |= 1U << key;
+    set(key, value);
     return std::move(*this);
   }
+  void set(std::size_t key, double value) {
+    values_[key] = value;
+    has_ |= 1U << key;
+  }
+  bool has(std::size_t key) const { return (has_ >> key & 1U) != 0; }
   // The value by that key, NaN for none.
-  double get(std::size_t key) const { return (has_ >> key & 1U) != 0 ? values_[key] : m::nan; }
+  double get(std::size_t key) const { return has(key) ? values_[key] : m::nan; }
   friend Trace operator|(Trace a, const Trace& b) {  // of both, that of b
     for (std::size_t key = 0; key < kTraceSlots; ++key) {
-      if ((b.has_ >> key & 1U) != 0) a.values_[key] = b.values_[key];
+      if (b.has(key)) a.values_[key] = b.values_[key];
     }
     a.has_ |= b.has_;
     return a;
@@ -164,6 +168,10 @@ class Trace {
   std::array<double, kTraceSlots> values_{};
   std::uint32_t has_ = 0;
 };
+
+namespace m {
+inline double element(const Trace& of, std::size_t key) { return of.get(key); }
+}  // namespace m
 
 // hil.control.AsgIsm of two dimensions, as the outer law calls it.
 class AsgBlock {

@@ -42,6 +42,7 @@ PARTS = (
     Part("hil/control/laws/within.py", ("WithinWheelSpeed",)),
     Part("hil/control/laws/turn_first.py", ("TurnFirst",)),
     Part("hil/control/laws/let_go.py", ("LetGo",)),
+    Part("hil/control/laws/axes.py", ("TurnedAxes",), pairs="_pairs"),
     Part(
         "hil/control/references.py",
         ("Point", "Circle", "Waypoints", "Stops", "_interval", "_chain_rule"),
