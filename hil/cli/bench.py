@@ -27,7 +27,8 @@ _SPEED = ("speed", "parts", "batch", "law", "campaign", "report")
               help="speed to report: counted runs of each figure, after one that is not counted; "
               "wheels: robots drawn from 10 % around the believed one.")  # fmt: skip
 @click.option("--tune", "candidates", type=click.IntRange(11, 100_000), metavar="CANDIDATES",
-              help="wheels: search the gains of both laws, that many candidates each.")  # fmt: skip
+              help="wheels: search the gains of all laws, that many candidates each, and judge what is "
+              "found on --runs robots that no candidate has run.")  # fmt: skip
 @click.option("--against", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
               help="speed to report: compare with what --json printed at another revision: ratio of "
               "the medians with its 95 % interval.")  # fmt: skip
@@ -74,7 +75,7 @@ def command(
     if plot is not None and (what != "growth" or not plot.absolute().parent.is_dir()):
         raise click.UsageError(f"--plot {plot}: for growth, in a folder that exists")
     if candidates is not None:
-        _tune_wheels(candidates, as_json)
+        _tune_wheels(candidates, runs, as_json)
     elif what == "wheels":
         _compare_wheels(runs, as_json)
     elif what == "vision":
@@ -222,19 +223,24 @@ def _compare_wheels(robots: int, as_json: bool) -> None:
     Console().print(table)
 
 
-def _tune_wheels(candidates: int, as_json: bool) -> None:
-    from hil.study import wheel_tune
+def _tune_wheels(candidates: int, robots: int, as_json: bool) -> None:
+    from hil.study import wheel_bench, wheel_tune
 
     def progress(what: str, done: int, candidates: int, best: float) -> None:
         click.echo(f"\r{what}: {done} of {candidates}, cost {best:.4f} ", nl=False, err=True)
 
     plan = wheel_tune.Plan(candidates=candidates)
-    document = wheel_tune.as_document(plan, wheel_tune.tune(plan, progress))
+    found = wheel_tune.tune(plan, progress)
     click.echo("", err=True)
+    unseen = wheel_bench.held_out(robots)
+    judged = wheel_tune.judge({law: stage.values for law, stage in found.items()}, unseen)
     if as_json:
-        print_json(document)
+        print_json(wheel_tune.as_document(plan, found, judged, unseen))
         return
-    for name, stage in document["found"].items():
-        click.echo(f"# {name}: cost {stage['start_cost']:.4f} to {stage['cost']:.4f}")
-        for parameter, value in stage["values"].items():
+    for law, stage in found.items():
+        click.echo(f"# {law}: cost {stage.start_cost:.4f} to {stage.cost:.4f}")
+        for parameter, value in stage.values.items():
             click.echo(f"{parameter} = {value:g}")
+    click.echo(f"on {robots} robots that no search has seen, 95 % intervals:")
+    for line in wheel_tune.as_lines(judged):
+        click.echo(line)

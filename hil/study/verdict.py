@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
 FORMAT = "hil-verdict-1"
 SEARCH_RUN_SEED, UNSEEN_RUN_SEED = 1, 1000
-SHIPPED, SINGLE = "shipped", "single best"
 Say = Callable[[str], None]
 Data = dict[str, Any]
 
@@ -159,12 +158,11 @@ def verdict_data(
         "axes_rad": {cell: round(drawn_axes_rad(cell), 4) for cell in field.unseen},
         "yardstick": {task: dict(figures) for task, figures in yard.figures.items()},
         "fronts": [],
-        "shipped": {},
+        "shipped_gains": shipped_gains(field.laws),
         "ablation": [],
     }
-    for law in field.laws:
-        data["shipped"][law] = _judged(law, None, field, plan, yard, make)
-        say(f"{law}: judged with the gains that ship")
+    data["shipped"] = shipped_scores(field, plan, yard, make)
+    say(f"{', '.join(field.laws)}: judged with the gains that ship")
     for seed in plan.search_seeds:
         for law in field.laws:
             front = search_front(
@@ -185,6 +183,17 @@ def verdict_data(
     rows = ablate(gains, field.ablated, list(seeds), yard, make, parts)
     data["ablation"] = [row.to_json() for row in rows]
     yield data
+
+
+def shipped_gains(laws: Sequence[str]) -> Data:
+    """Return the values of the gains that ship, by law."""
+    base = ControlConfig().active_gains
+    return {law: base.of(OUTER_LAWS.get(law)).model_dump(mode="json") for law in laws}
+
+
+def shipped_scores(field: Field, plan: VerdictPlan, yard: Yardstick, make: Make) -> Data:
+    """Return the scores of the gains that ship in each unseen cell, by law."""
+    return {law: _judged(law, None, field, plan, yard, make) for law in field.laws}
 
 
 def _scores(

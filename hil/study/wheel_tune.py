@@ -1,17 +1,19 @@
 """Gains of the wheel laws: the search of hil.study.tune on the wheel bench (docs/wheel-loop.md).
 
-What both laws share (feed-forward, differentiator, limits) stays as the board has it; the gains of
-each law are searched with the same candidates, cases, robots and seeds.
+What the laws share (feed-forward, differentiator, limits) stays as the board has it; the gains of
+each law are searched with the same candidates, cases, robots and seeds. What was found is judged on
+robots that no search has seen.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from hil.analysis.costs import COST_FAILED
+from hil.analysis.stats import Paired, paired
 from hil.core.registry import Box
 from hil.study.tune import Found, minimise
 from hil.study.wheel_bench import CASES, DEFAULT, Case, figures, run
@@ -45,11 +47,13 @@ SEARCH: dict[str, Box] = {
 TOLERANCE_RAD_S = 0.2
 TOLERANCE_RATIO = 0.1
 CHATTER_WEIGHT_S = 0.03
+# The law that the others are compared with.
+BASELINE = "pid"
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What both laws are given alike."""
+    """What the laws are given alike."""
 
     robots: tuple[int, ...] = (DEFAULT, 1)
     candidates: int = 181
@@ -94,10 +98,76 @@ def tune(plan: Plan, progress: Progress) -> dict[str, Found]:
     return {law: searched(law) for law in SEARCH}
 
 
-def as_document(plan: Plan, found: Mapping[str, Found]) -> dict[str, Any]:
-    """Return the values found with all that it takes to find them again."""
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """A law's mean cost of each robot that no search has seen: as found, and with the board's defaults."""
+
+    found: tuple[float, ...]
+    defaults: tuple[float, ...]
+
+    @property
+    def gained(self) -> Paired:
+        """Return as found minus the defaults, robot by robot."""
+        return paired(self.defaults, self.found)
+
+    def minus(self, other: Judged) -> dict[str, Paired]:
+        """Return this law minus another, robot by robot: as found, and with the defaults."""
+        return {
+            "found": paired(other.found, self.found),
+            "defaults": paired(other.defaults, self.defaults),
+        }
+
+
+def judge(values: Mapping[str, Mapping[str, float]], robots: Sequence[int]) -> dict[str, Judged]:
+    """Return what the values found of each law are worth on robots that no search has seen."""
+
+    def costs(law: str, parameters: Mapping[str, float]) -> tuple[float, ...]:
+        return tuple(bench_cost(law, parameters, (robot,)) for robot in robots)
+
+    return {law: Judged(costs(law, own), costs(law, {})) for law, own in values.items()}
+
+
+def as_document(
+    plan: Plan, found: Mapping[str, Found], judged: Mapping[str, Judged], robots: Sequence[int]
+) -> dict[str, Any]:
+    """Return the values found, all that it takes to find them again, and what they are worth."""
     return {
         "procedure": "hil.study.wheel_tune: CMA-ES on log gains, see docs/wheel-loop.md",
         "plan": asdict(plan),
         "found": {name: asdict(stage) for name, stage in found.items()},
+        "held_out_robots": list(robots),
+        "judged": {law: _told(law, judged) for law in judged},
     }
+
+
+def _told(law: str, judged: Mapping[str, Judged]) -> dict[str, Any]:
+    own = judged[law]
+    told: dict[str, Any] = {
+        "found_minus_defaults": own.gained.to_json(),
+        "cost_by_robot": {"found": list(own.found), "defaults": list(own.defaults)},
+    }
+    if law != BASELINE and BASELINE in judged:
+        against = own.minus(judged[BASELINE])
+        told[f"minus_{BASELINE}"] = {name: one.to_json() for name, one in against.items()}
+    return told
+
+
+def as_lines(judged: Mapping[str, Judged]) -> list[str]:
+    """Return what was judged in lines: mean costs, and differences with their 95 % intervals."""
+
+    def text(one: Paired) -> str:
+        return f"{one.mean:+.4f} ({one.interval.low:+.4f} to {one.interval.high:+.4f})"
+
+    lines = []
+    for law, own in judged.items():
+        cost = own.gained
+        line = (
+            f"{law}: {cost.other_mean:.4f} as found, {cost.baseline_mean:.4f} with the board's "
+            f"defaults, {text(cost)}"
+        )
+        if law != BASELINE and BASELINE in judged:
+            against = own.minus(judged[BASELINE])
+            line += f"; minus {BASELINE} as found {text(against['found'])}"
+            line += f", with the defaults {text(against['defaults'])}"
+        lines.append(line)
+    return lines

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <numeric>
 #include <stdexcept>
 
@@ -44,11 +45,14 @@ template <int kWidth>
 class Lanes {
  public:
   Lanes(LaneRun run, Leg* legs, std::vector<std::size_t> order)
-      : run_(run), legs_(legs), order_(std::move(order)) {}
+      : run_(run), legs_(legs), order_(std::move(order)) {
+    for (auto& at : block_.loads) std::fill(std::begin(at), std::end(at), V{});
+  }
 
-  void run() {
+  // Moves the legs until so few are under way that half the width holds them, and returns those.
+  std::vector<std::size_t> run() {
     for (int lane = 0; lane < kWidth; ++lane) fill(lane);
-    while (count() > 0) {
+    while (count() > kWidth / 2) {
       const int steps = run_steps();
       take(steps);
       for (int lane = 0; lane < kWidth; ++lane) {
@@ -56,6 +60,14 @@ class Lanes {
       }
       if (row_ == Block::kRows) row_ = 0;
     }
+    std::vector<std::size_t> left;
+    for (int lane = 0; lane < kWidth; ++lane) {
+      const Seat& seat = seats_[lane];
+      if (seat.leg == nullptr) continue;
+      if (row_ > seat.first) hand_over(lane);
+      if (!seat.leg->failed) left.push_back(static_cast<std::size_t>(seat.leg - legs_));
+    }
+    return left;
   }
 
  private:
@@ -128,8 +140,7 @@ class Lanes {
     }
     if (seat.left > 0 && row_ < Block::kRows) return;
     Leg& leg = *seat.leg;
-    leg.together += row_ - seat.first;
-    guarded(leg, [&] { leg.kernel->follow(track(seat, lane), state(lane), seat.sag_v); });
+    hand_over(lane);
     seat.first = row_ % Block::kRows;
     if (leg.failed) {
       fill(lane);
@@ -144,6 +155,13 @@ class Lanes {
         load_duty(lane, *leg.kernel);
       }
     }
+  }
+
+  void hand_over(int lane) {
+    const Seat& seat = seats_[lane];
+    Leg& leg = *seat.leg;
+    leg.together += row_ - seat.first;
+    guarded(leg, [&] { leg.kernel->follow(track(seat, lane), state(lane), seat.sag_v); });
   }
 
   Track track(const Seat& seat, int lane) const {
@@ -212,7 +230,7 @@ class Lanes {
   int row_ = 0;
   bool filled_ = false;
   std::array<Seat, kWidth> seats_{};
-  Block block_{};
+  Block block_;
 };
 
 // The longest way first: its lane would be the last one, alone.
@@ -257,22 +275,13 @@ void advance_together(Leg* legs, std::size_t n, Width width) {
     legs[i].failed = nullptr;
     legs[i].together = 0;
   }
-  if (n < 2 || width == Width::kOne) {
-    for (std::size_t i = 0; i < n; ++i) alone(legs[i]);
-    return;
-  }
   std::vector<std::size_t> order = longest_first(legs, n);
 #ifdef TWIN_WIDE_LANES
-  if (width == Width::kEight && n > 4) {
-    Lanes<8>(run_eight, legs, std::move(order)).run();
-    return;
-  }
-  if (width >= Width::kFour && n > 2) {
-    Lanes<4>(run_four, legs, std::move(order)).run();
-    return;
-  }
+  if (width == Width::kEight && order.size() > 4) order = Lanes<8>(run_eight, legs, std::move(order)).run();
+  if (width >= Width::kFour && order.size() > 2) order = Lanes<4>(run_four, legs, std::move(order)).run();
 #endif
-  Lanes<2>(run_two, legs, std::move(order)).run();
+  if (width >= Width::kTwo && order.size() > 1) order = Lanes<2>(run_two, legs, std::move(order)).run();
+  for (const std::size_t i : order) alone(legs[i]);
 }
 
 }  // namespace twin

@@ -162,6 +162,28 @@ def test_estimate_and_truth_tell_nearly_the_same_disturbance():
     assert seen == pytest.approx(true, rel=0.3)
 
 
+def test_without_truth_the_disturbance_is_the_residual_of_the_chain():
+    """What a rig or a replay records has no true motion: the figures stand on the estimate alone."""
+    record = run("scenario-1", gains=ACTS)
+    facts = record.law_facts()
+    blind = {
+        name: np.full_like(values, np.nan) if name.startswith("true_") else values
+        for name, values in record.samples.items()
+    }
+    found = metrics.compute(blind, None, facts)
+    assert found.basis == "estimate"
+    residual = sliding.disturbance(blind, "est", facts.d0_m)
+    assert found.values["disturbance_90_m_s3"] == pytest.approx(np.percentile(residual, 90))
+    assert found.values["alpha_over_d90_ratio"] >= 2.0
+    assert found.values["sliding_acts"] == 1.0
+    known = record.figures().values
+    assert found.values["disturbance_90_m_s3"] != known["disturbance_90_m_s3"]  # that of the truth
+    assert found.values["law_ticks"] == known["law_ticks"]
+    pushed = dict(blind, est_eta1_m_s=blind["est_eta1_m_s"] + 0.1 * np.sin(6.0 * blind["t_s"]))
+    more = metrics.compute(pushed, None, facts).values["disturbance_90_m_s3"]
+    assert more > 1.2 * found.values["disturbance_90_m_s3"]
+
+
 def test_a_law_without_sliding_variable_has_only_its_ticks():
     """PID: the ticks of the law are known, everything about a sliding term is not."""
     values = run("scenario-1", "pid").figures().values

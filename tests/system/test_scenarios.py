@@ -9,10 +9,15 @@ import numpy as np
 import pytest
 
 from hil.config.deck import load_deck
+from hil.core.registries import OUTER_LAWS
+from hil.core.registry import BUILT_IN
 from tests.system.runs import run, scenario_with
 
 DECK = load_deck("thesis")
 INNER = ("asg-ism", "pid")
+OTHERS = sorted(
+    e.name for e in OUTER_LAWS.entries() if e.origin == BUILT_IN and e.name not in DECK.laws
+)
 
 
 @pytest.mark.parametrize(("name", "outer", "inner"), [*product(DECK.scenarios, DECK.laws, INNER)])
@@ -24,6 +29,17 @@ def test_requirements_hold_with_every_law(
     assert record.manifest.outcome == "complete", record.manifest.outcome_detail
     failed = [f"{item.text()} is {item.value:.4g}" for item in record.verdicts() if not item.holds]
     assert failed == []
+
+
+@pytest.mark.parametrize(("name", "outer"), [*product((*DECK.scenarios, "circle"), OTHERS)])
+def test_the_other_laws_hold_with_the_gains_that_ship(
+    tmp_path: Path, name: str, outer: str
+) -> None:
+    """The three experiments with the tuned sets, the circle at 0.8 m/s with the gains that it brings."""
+    changed = ["duration_s=30"] if name == "circle" else []
+    record = run(scenario_with(name, changed), tmp_path / "run", outer=outer)
+    assert record.manifest.outcome == "complete", record.manifest.outcome_detail
+    assert all(verdict.holds for verdict in record.verdicts())
 
 
 @pytest.mark.parametrize(("name", "outer"), [*product(DECK.scenarios, DECK.laws)])

@@ -92,11 +92,11 @@ def test_a_side_at_its_limit_lacks_speed_in_its_direction():
     assert sides((380, 0), (2.0, 0.0), (8.0, 0.0)) == (0, 0)
 
 
-def run(outer, *overrides):
+def run(outer, *overrides, seed=3):
     """Return the record of scenario-1 on the twin."""
     scenario = load_scenario("scenario-1", overrides)
     return execute_in_memory(
-        RunSpec(scenario, "twin", "pose", outer, "asg-ism", 3, Path(), rerun=False)
+        RunSpec(scenario, "twin", "pose", outer, "asg-ism", seed, Path(), rerun=False)
     )
 
 
@@ -108,11 +108,58 @@ def test_on_a_floor_with_grip_the_turn_is_made_sooner(outer):
     assert with_it["iae_m_s"] < 0.82 * without["iae_m_s"]
 
 
+@pytest.mark.parametrize("outer", ["asg-ism", "pid"])
+def test_a_floor_with_grip_is_held_where_speed_gives_way_sooner(outer):
+    """Friction 0.77, the point behind on the left: at rest within 20 mm once 0.3 rad/s missing suffice.
+
+    Negative control: where speed does not give way the wheels stand against each other until the board stops.
+    """
+    start = ("start.x_m=0.466", "start.y_m=-0.240", "start.theta_rad=0.028")
+    grip = ("robot.floor.friction_ratio=0.77", *start)
+    for seed in (138, 139):
+        sooner = run(outer, *grip, "control.limits.turn_missing_rad_s=0.3", seed=seed)
+        assert sooner.manifest.outcome == "complete"
+        assert sooner.figures().values["delta1_worst_last_second_m"] < 0.02
+        kept = run(outer, *grip, NEVER, seed=seed)
+        assert "STALL" in kept.manifest.outcome_detail
+
+
+def test_a_turn_about_the_point_is_a_limit_of_the_default():
+    """Found by `hil falsify`: at 1.62 of the believed friction PID turns by more than half a turn, or back.
+
+    With 0.3 rad/s missing as the threshold it turns as far as the point asks for.
+    """
+    floor = "mismatch.floor.friction_ratio=1.623"
+    for seed in (1, 2, 3):
+        turned = run("pid", floor, seed=seed).figures().values["turn_rad"]
+        assert not -3.1416 <= turned <= -0.2
+        sooner = run("pid", floor, "control.limits.turn_missing_rad_s=0.3", seed=seed)
+        assert all(found.holds for found in sooner.verdicts())
+
+
 def test_the_verdict_names_the_turn_that_the_motors_do_not_make():
     """Friction 0.9: the side, its share of the run, what was made of the turn; none on the usual floor."""
     told = run("pid", "robot.floor.friction_ratio=0.9").diagnoses()
     assert any("the turn needs more torque than the motors give" in text for text in told)
     assert not any("torque" in text for text in run("pid").diagnoses())
+
+
+@pytest.mark.parametrize("outer", ["asg-ism", "pid"])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        ("robot.mass_kg=6",),
+        ("robot.wheel_radius_m=0.096",),
+        ("robot.battery.charge_start_ratio=0.1", "robot.floor.friction_ratio=1.07"),
+    ],
+    ids=["6 kg", "wheels of 96 mm", "battery at 10 %"],
+)
+def test_a_robot_that_cannot_turn_is_no_complete_run(changes, outer):
+    """Too heavy, geared too tall or out of charge: the run ends early and says that it is the turn."""
+    record = run(outer, *changes)
+    assert record.manifest.outcome != "complete"
+    assert not all(found.holds for found in record.verdicts())
+    assert any("the turn needs more torque" in text for text in record.diagnoses())
 
 
 def test_usual_runs_are_hardly_touched():

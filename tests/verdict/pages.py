@@ -1,6 +1,7 @@
 """Put what the verdict's data say into README and docs: `python -m tests.verdict.pages`, after a new verdict.
 
-Between the marks <!-- verdict --> and <!-- /verdict --> (and ablation) the pages hold what is made here.
+Between the marks <!-- verdict --> and <!-- /verdict --> (and ablation, shipped) the pages hold what is
+made here.
 """
 
 import json
@@ -52,6 +53,11 @@ def ablation_block():
     return f"With the gains that ship, in {cells} unseen cells of `{found['deck']}`:\n\n{table}"
 
 
+def shipped_block(data):
+    """Return what the gains that ship are worth in the unseen cells."""
+    return "\n".join(words.shipped_table(data))
+
+
 def filled(text, name, content):
     """Return a page with what stands between the marks of `name` replaced."""
     marks = f"<!-- {name} -->", f"<!-- /{name} -->"
@@ -67,6 +73,7 @@ def pages(data):
         text = filled((ROOT / name).read_text(encoding="utf-8"), "verdict", block(data))
         if name == "docs/verdict.md":
             text = filled(text, "ablation", ablation_block())
+            text = filled(text, "shipped", shipped_block(data))
         found[name] = text
     return found
 

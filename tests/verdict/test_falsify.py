@@ -156,12 +156,49 @@ def test_against_another_law_both_margins_count():
     assert Trial((), ours, Outcome(0.2, "")).objective == pytest.approx(-0.7)
 
 
+MOVED = """
+[range]
+"start.theta_rad" = { low = -0.8, high = 0.8, offset = true }
+"start.x_m" = { low = -0.08, high = 0.08, offset = true }
+"""
+
+
+def test_what_the_task_asks_for_moves_with_its_start(tmp_path):
+    """Turned 0.8 rad to the right there is 0.8 rad less to turn to the right: both bounds move by that.
+
+    The point lies at (0.65, 0.7) m from the start, 0.822 rad counter-clockwise from X; 80 mm further on it is
+    at 0.887 rad. z1 begins 30 mm ahead of the centre of mass: cos(0.7708) x 30 = 21.5 mm in X.
+    """
+    box = box_of(tmp_path, "scenario-1", MOVED)
+    usual = {r.metric: r for r in box.at(box.usual).requirements}
+    assert (usual["turn_rad"].min, usual["turn_rad"].max) == (-3.1416, -0.2)
+    turned = {r.metric: r for r in box.at((0.0, 0.5)).requirements}
+    assert (turned["turn_rad"].min, turned["turn_rad"].max) == pytest.approx((-2.3416, 0.6))
+    assert turned["start_offset_x_m"].max == pytest.approx(-0.2 + 0.0215, abs=2e-4)
+    assert turned["delta1_worst_last_second_m"] == usual["delta1_worst_last_second_m"]
+    moved = {r.metric: r for r in box.at((0.5, 1.0)).requirements}
+    assert moved["turn_rad"].max == pytest.approx(-0.2 + 0.887 - 0.822, abs=1e-3)
+    assert moved["start_offset_x_m"].max == pytest.approx(-0.12)
+
+
+def test_a_robot_that_begins_turned_is_no_counterexample(tmp_path):
+    """Scenario 1 from 0.7 rad further right holds all; as it states them its requirements would not."""
+    box = box_of(tmp_path, "scenario-1", MOVED)
+    scenario = box.at((0.0625, 0.5))
+    assert scenario.start.theta_rad == pytest.approx(1.5708 - 0.7, abs=1e-3)
+    assert OneRun()((scenario, "pid", 3)).margin > 0.0
+    stated = scenario.model_copy(update={"requirements": box.scenario.requirements})
+    outcome = OneRun()((stated, "pid", 3))  # negative control
+    assert outcome.margin < 0.0
+    assert "turn_rad" in outcome.why
+
+
 def test_what_is_kept_replays_the_run(tmp_path):
     """The written scenario gives the margin of the search, to the last digit, and the deck holds it."""
     task = load_scenario("ahead", ["duration_s=4"])
     box = load_box(str(box_file(tmp_path)), task)
     point = list(box.usual)
-    point[0], point[-1] = 1.0, 0.9
+    point[0], point[1], point[-1] = 1.0, 0.8, 0.9
     run = OneRun()
     outcome = run((box.at(point), "pid", 5))
     keep = tmp_path / "kept"
@@ -171,6 +208,7 @@ def test_what_is_kept_replays_the_run(tmp_path):
     )
     scenario = load_scenario(str(file))
     assert scenario.control.outer == "pid"
+    assert scenario.requirements == box.at(point).requirements
     spec = RunSpec(scenario, "twin", scenario.camera_source, "pid", "asg-ism", 5, tmp_path)
     replayed, _ = margin_of(execute_in_memory(spec).verdicts())
     assert replayed == outcome.margin

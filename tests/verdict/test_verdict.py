@@ -13,8 +13,17 @@ from hil.core.errors import BadInput
 from hil.study import verdict_page
 from hil.study import verdict_words as words
 from hil.study.suite import KEPT
-from hil.study.verdict import SHORT, Field, VerdictPlan, repeated_texts, shipped_text, verdict_data
+from hil.study.verdict import (
+    SHORT,
+    Field,
+    VerdictPlan,
+    repeated_texts,
+    shipped_gains,
+    shipped_text,
+    verdict_data,
+)
 from tests.verdict.pages import pages
+from tests.verdict.shipped import FILES, judged_anew
 
 ROOT = Path(__file__).resolve().parents[2]
 PLAN = VerdictPlan(
@@ -206,3 +215,45 @@ def test_readme_and_docs_say_what_the_data_say():
     changed["fronts"][0]["hypervolume"] += 0.2
     for name, made in pages(changed).items():  # negative control
         assert (ROOT / name).read_text(encoding="utf-8") != made
+
+
+def test_the_gains_that_ship_are_those_the_data_judge():
+    """In every file of a verdict: after new gains `python -m tests.verdict.shipped` judges them anew."""
+    for file in FILES:
+        data = json.loads(file.read_text(encoding="utf-8"))
+        now = json.loads(json.dumps(shipped_gains(data["laws"])))
+        assert data["shipped_gains"] == now, "python -m tests.verdict.shipped"
+        assert set(data["shipped"]) == set(data["laws"])
+
+
+def test_judging_the_gains_that_ship_anew_gives_the_data_that_are_there():
+    """Two laws in one unseen cell, run now: the same scores, to the last digit that is kept."""
+    data = json.loads(shipped_text())
+    one = dict.fromkeys(("search_cells", "unseen_cells", "ablation_cells"), 1)
+    few = {**data, "laws": ["backstepping", "pid"], "plan": {**data["plan"], **one}}
+    few["shipped_gains"] = {}
+    made = judged_anew(few)
+    for law in few["laws"]:
+        (cell,) = made["shipped"][law]
+        assert made["shipped"][law][cell] == data["shipped"][law][cell]
+    with pytest.raises(SystemExit, match="another one by now"):  # negative control
+        judged_anew({**few, "yardstick": {**data["yardstick"], "ahead": {}}})
+
+
+def test_the_table_of_shipped_gains_by_hand():
+    """A law at half of PID's accuracy score everywhere is -50 % and stands; one that varies does not."""
+    cells = [f"{task} in {condition}" for task in "abcde" for condition in "xyz"]
+    far = {cell: [[2.0 if i % 2 else 0.5, 1.0, 1.0]] for i, cell in enumerate(cells)}
+    data = {
+        "unseen_cells": cells,
+        "shipped": {
+            "pid": {cell: [[1.0, 0.8, 0.5]] for cell in cells},
+            "half": {cell: [[0.5 + 0.001 * i, 1.0, 1.0]] for i, cell in enumerate(cells)},
+            "varied": far,
+        },
+    }
+    lines = words.shipped_table(data)
+    assert lines[2].startswith("| half | 0.51 | 1.00 | 1.00 | **-49 % (")
+    assert lines[3] == "| pid | 1.00 | 0.80 | 0.50 |  |"
+    assert lines[4].startswith("| varied | 1.20 | 1.00 | 1.00 | ")
+    assert "**" not in lines[4]

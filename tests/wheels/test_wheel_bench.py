@@ -157,7 +157,37 @@ def test_the_search_gives_both_laws_the_same_budget(monkeypatch):
     for name, stage in found.items():
         assert stage.cost <= stage.start_cost
         assert all(boxes[name][k][0] <= v <= boxes[name][k][2] for k, v in stage.values.items())
-    json.dumps(wheel_tune.as_document(plan, found), allow_nan=False)
+    judged = wheel_tune.judge({law: stage.values for law, stage in found.items()}, HELD_OUT * 2)
+    told = wheel_tune.as_document(plan, found, judged, HELD_OUT * 2)
+    json.dumps(told, allow_nan=False)
+    assert "minus_pid" in told["judged"]["asg-ism"]
+    assert "minus_pid" not in told["judged"]["pid"]
+
+
+def test_what_was_found_is_judged_robot_by_robot():
+    """By hand: 0.5, 0.6, 0.7 against 0.6, 0.6, 0.8, and against PID's 0.4, 0.5, 0.6 as found."""
+    pid = wheel_tune.Judged((0.4, 0.5, 0.6), (0.5, 0.5, 0.5))
+    own = wheel_tune.Judged((0.5, 0.6, 0.7), (0.6, 0.6, 0.8))
+    assert own.gained.mean == pytest.approx(-0.2 / 3)
+    against = own.minus(pid)
+    assert against["found"].mean == pytest.approx(0.1)
+    assert against["found"].certain
+    assert against["defaults"].mean == pytest.approx(0.5 / 3)
+    lines = wheel_tune.as_lines({"asg-ism": own, "pid": pid})
+    assert lines[0].startswith(
+        "asg-ism: 0.6000 as found, 0.6667 with the board's defaults, -0.0667"
+    )
+    assert "minus pid as found +0.1000 (+0.1000 to +0.1000)" in lines[0]
+    assert "minus" not in lines[1]
+
+
+def test_the_defaults_judged_against_themselves_gain_nothing(monkeypatch):
+    """Negative control: the board's own values as found make a difference of exactly 0 on every robot."""
+    monkeypatch.setattr(wheel_tune, "CASES", {"crawl": replace(CASES["crawl"], duration_s=0.3)})
+    judged = wheel_tune.judge({"pid": {}}, wheel_bench.held_out(2))["pid"]
+    assert judged.found == judged.defaults
+    assert judged.found[0] != judged.found[1]
+    assert judged.gained.mean == 0.0
 
 
 def test_command_prints_the_table_as_json():

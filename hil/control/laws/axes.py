@@ -13,6 +13,7 @@ from functools import cache
 from random import Random
 from typing import TYPE_CHECKING
 
+from hil.control.laws.hold import HoldAtGoal
 from hil.core.types import OuterCommand, Pose, ReferenceState
 
 if TYPE_CHECKING:
@@ -86,5 +87,13 @@ def _pairs(names: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
 
 
 def in_axes(law: OuterLaw, angle_rad: float) -> OuterLaw:
-    """Return the law working in axes turned by `angle_rad`; itself at 0."""
-    return TurnedAxes(law, angle_rad) if angle_rad else law
+    """Return the law working in axes turned by `angle_rad`; itself at 0.
+
+    The rest at the goal knows no axes and stays around it, so that a robot at rest asks no law.
+    """
+    if not angle_rad:
+        return law
+    if type(law) is HoldAtGoal:
+        law._law = TurnedAxes(law._law, angle_rad)
+        return law
+    return TurnedAxes(law, angle_rad)

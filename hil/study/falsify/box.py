@@ -13,6 +13,7 @@ from hil.config.events import Disturbance, Shape, Target
 from hil.config.load import build, dotted_names, put_value, read_tree
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
+from hil.study.falsify.moved import moved_requirements
 
 DEFAULT = "default"
 
@@ -106,7 +107,8 @@ class Box:
         }
 
     def tree_at(self, point: Sequence[float]) -> dict[str, Any]:
-        """Return the scenario's tree at a point."""
+        """Return the scenario's tree at a point; requirements on where it begins move with its start."""
+        usual = self.scenario.model_dump(mode="json")
         tree = self.scenario.model_dump(mode="json")
         for axis, share in zip(self.axes, point, strict=True):
             value = axis.value(share)
@@ -118,7 +120,7 @@ class Box:
                 tree["mismatch"][axis.key.removeprefix("mismatch.")] = value
             else:
                 put_value(tree, axis.key, value)
-        return tree
+        return tree | {"requirements": moved_requirements(usual, tree)}
 
     def at(self, point: Sequence[float]) -> Scenario:
         """Return the scenario at a point; raises BadInput where its values do not go together."""

@@ -72,9 +72,14 @@ def scenario_text(
     for key, value in departures.items():
         if axes[key].push is None:
             lines.append(f"{_dotted(key)} = {value!r}  # usual: {axes[key].usual:g}")
-    for disturbance in tree["disturbances"]:
-        lines += ["", "[[disturbances]]"]
-        lines += [f"{k} = {_value(v)}" for k, v in disturbance.items() if v is not None]
+    usual = box.scenario.model_dump(mode="json")["requirements"]
+    for table, rows in (
+        ("requirements", tree["requirements"] if tree["requirements"] != usual else ()),
+        ("disturbances", tree["disturbances"]),
+    ):
+        for row in rows:
+            lines += ["", f"[[{table}]]"]
+            lines += [f"{k} = {_value(v)}" for k, v in row.items() if v is not None]
     return "\n".join(lines) + "\n"
 
 
