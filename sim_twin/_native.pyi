@@ -34,6 +34,20 @@ class PlantParams:
     def __setattr__(self, name: str, value: float, /) -> None: ...
     def __getattr__(self, name: str, /) -> float: ...
 
+CHAINS: tuple[str, ...]
+
+def chained(chain: int, operations: int) -> float:
+    """Do operations of a kind of CHAINS, each of which waits for the result of the one before."""
+
+def widest_register() -> int:
+    """Return how many doubles a register of this processor holds at most: 2, 4 or 8."""
+
+def side_by_side(width: int, operations: int, quotients: bool = False) -> int:
+    """Do at least so many independent sums and products, or quotients, `width` doubles a register.
+
+    Returns how many; 0 where the processor does not have the width.
+    """
+
 class Plant:
     """The robot alone: bridge duty in, motion out."""
 
@@ -411,7 +425,7 @@ def project(view: View, x: float, y: float, z: float) -> list[float]:
     """Return the pixel (u, v) of a world point; raises ValueError behind the camera."""
 
 class DrawnRig:
-    """The rig with drawn poses for a camera, as native code of the host drives it."""
+    """The rig with drawn poses or pictures for a camera, as native code of the host drives it."""
 
     def __init__(
         self,
@@ -422,7 +436,10 @@ class DrawnRig:
         sigma_xy_m: float,
         sigma_theta_rad: float,
         true_d0_m: float,
-    ) -> None: ...
+        poses: int,
+    ) -> None:
+        """`poses` are those that a picture takes along; with 0 of them frames bring drawn poses."""
+
     def set_faults(
         self, repeats: Sequence[_Span], stamp_steps: Sequence[tuple[float, _Span]]
     ) -> None:
@@ -430,6 +447,12 @@ class DrawnRig:
 
     def take_frame(self) -> tuple[int, float, tuple[float, float, float] | None, str] | None:
         """Return number, stamp, pose (None where the robot was not seen) and why not."""
+
+    def shown(self) -> tuple[int, float, tuple[tuple[float, float, float], ...]] | None:
+        """Return number, begin and poses of what the picture of the frame taken last shows.
+
+        Of one that repeats the frame before it is that one's; None before the first, or without pictures.
+        """
 
     def handle(self) -> object:
         """Return what native code takes; it lives as long as this."""

@@ -55,6 +55,11 @@ class FaultyMaker:
             if fault.kind == "camera_mark_covered":
                 self._covered = covered()
 
+    @property
+    def any(self) -> bool:
+        """Whether pictures are faulty at some time."""
+        return bool(self._faults)
+
     def begin(self, span: Callable[[Fault], Span]) -> None:
         """Let the faults' times be those that `span` gives."""
         self._spans = [span(fault) for fault in self._faults]

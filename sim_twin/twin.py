@@ -7,7 +7,7 @@ in `wait`; nothing here reads a real clock. Host time is virtual time + HOST_STA
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from random import Random
 from typing import TYPE_CHECKING
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from hil.config.events import Disturbance, Fault
     from hil.config.link import LinkConfig
     from hil.config.robot import RobotConfig
-    from hil.core.rig import ByteStream
+    from hil.core.rig import ByteStream, Picture
 
 # No clock of a real rig starts at zero; whoever mixes up host, board and camera time shall notice.
 HOST_START_S = 1000.0
@@ -134,8 +134,9 @@ class Twin:
             drawn.sigma_xy_m,
             drawn.sigma_theta_rad,
             self._vehicle.geometry.d0_m,
+            0 if maker is None else _poses_of(setup.camera),
         )
-        self._last_frame: Frame | None = None
+        self._picture: tuple[int, Picture] | None = None  # the last one, and its number
         self._set_spans(math.inf)
         self._outside = self._open_outside(setup)
         self._outside_told = False
@@ -182,9 +183,7 @@ class Twin:
 
     def _move(self, until_s: float) -> None:
         # Where no image is drawn a frame is the one pose at the middle of its exposure.
-        rolling = self._setup.camera.line_time_s > 0.0
-        drawn = POSES_PER_READOUT if rolling else POSES_PER_EXPOSURE
-        poses = 1 if self._maker is None else drawn
+        poses = 1 if self._maker is None else _poses_of(self._setup.camera)
         try:
             if self._outside is None:
                 self._rig.wait(until_s, poses)
@@ -201,32 +200,29 @@ class Twin:
 
     def poll_frame(self) -> Frame | None:
         """Return the oldest frame not yet taken; it is drawn only now."""
-        if self._maker is None:
-            drawn = self._eye.take_frame()
-            if drawn is None:
-                return None
-            index, t_cam_s, pose, reason = drawn
-            return Frame(index, t_cam_s, None, self._drawn.said(pose, reason))
-        taken = self._rig.take_frame()
+        taken = self._eye.take_frame()
         if taken is None:
             return None
-        index, start_s, t_cam_s, poses = taken
-        repeated = any(begin_s <= start_s < end_s for begin_s, end_s in self._repeats)
-        if repeated and self._last_frame is not None:
-            self._last_frame = replace(self._last_frame, index=index, t_cam_s=t_cam_s)
-        else:
-            self._last_frame = Frame(index, t_cam_s, self._pictures.make(start_s, index, poses))
-        step_s = sum(
-            size_s for size_s, (begin_s, end_s) in self._stamp_steps if begin_s <= start_s < end_s
-        )
-        if not step_s:
-            return self._last_frame
-        return replace(self._last_frame, t_cam_s=t_cam_s + step_s)
+        index, t_cam_s, pose, reason = taken
+        if self._maker is None:
+            return Frame(index, t_cam_s, None, self._drawn.said(pose, reason))
+        return Frame(index, t_cam_s, self.picture())
+
+    def picture(self) -> Picture:
+        """Return the picture of the frame taken last; one that repeats the frame before has that one's."""
+        shown = self._eye.shown()
+        assert shown is not None  # else there is no frame, or it brings a drawn pose
+        index, start_s, poses = shown
+        if self._picture is None or self._picture[0] != index:
+            self._picture = index, self._pictures.make(start_s, index, poses)
+        return self._picture[1]
 
     def native(self) -> object | None:
         """Return the handle by which native code drives this rig, None where it needs Python code."""
-        if self._maker is not None or self._outside is not None or self._host.any:
+        if self._outside is not None or self._host.any:
             return None
+        if self._maker is not None and (self._pictures.any or self._setup.camera.line_time_s > 0.0):
+            return None  # what is drawn at once is told apart by its pixels, not by what it shows
         own = (getattr(type(self), name) is method for name, method in _OWN.items())
         if type(self.stream) is not TwinStream or not all(own):
             return None  # a rig that does one of these in its own way is asked
@@ -252,13 +248,12 @@ class Twin:
         def spans(kind: str) -> list[Span]:
             return [_span(fault, t_begin_s) for fault in self._setup.faults if fault.kind == kind]
 
-        self._repeats = spans("camera_repeated")
-        self._stamp_steps = [
+        stamp_steps = [
             (fault.step_s, _span(fault, t_begin_s))
             for fault in self._setup.faults
             if fault.kind == "camera_clock_step"
         ]
-        self._eye.set_faults(self._repeats, self._stamp_steps)
+        self._eye.set_faults(spans("camera_repeated"), stamp_steps)
         self._rig.set_spans(sorted(spans("camera_stall")), spans("camera_occluded"))
         both = spans("link_cut")
         for channel, one in ((self._rig.down, "link_down_cut"), (self._rig.up, "link_up_cut")):
@@ -270,7 +265,12 @@ class Twin:
 
 
 # What native code does in place of these.
-_OWN = {name: getattr(Twin, name) for name in ("now_s", "wait", "poll_frame", "truth")}
+_OWN = {name: getattr(Twin, name) for name in ("now_s", "wait", "poll_frame", "picture", "truth")}
+
+
+def _poses_of(camera: CameraConfig) -> int:
+    """Return how many poses a picture takes along."""
+    return POSES_PER_READOUT if camera.line_time_s > 0.0 else POSES_PER_EXPOSURE
 
 
 def _covered_maker(setup: TwinSetup) -> FrameMaker:

@@ -91,6 +91,29 @@ class RimFitter:
     ) -> tuple[tuple[Disc, Disc] | None, bool]:
         """Return what `fit` does, and whether it looked at a pixel outside of both windows."""
 
+class Spot:
+    """Where a mark is on its plane, and the covariance of that: xx, xy, yx, yy, m^2."""
+
+    def __init__(self, at_m: Point, spread_m2: Sequence[float]) -> None: ...
+    @property
+    def at_m(self) -> Point:
+        """Place on the plane of the marks, world axes."""
+
+    @property
+    def spread_m2(self) -> tuple[float, float, float, float]:
+        """Covariance, row by row."""
+
+def spot(camera: Camera, disc: Disc, height_m: float) -> Spot:
+    """Return where a disc of that height is, with what it claims; NaN where no ray meets the plane."""
+
+def gap_variance(one: Spot, other: Spot, length_m: float) -> float:
+    """Return the variance of the distance of two spots `length_m` apart, m^2."""
+
+def weighted_pose(
+    body_m: tuple[Point, Point], one: Spot, other: Spot
+) -> tuple[float, float, float, tuple[float, float, float, float, float, float], float]:
+    """Return x_m, y_m, theta_rad, covariance (upper triangle) and weighted squares of `vision.pose_fit`."""
+
 class MarkSearch:
     """Looks for marks in shrunk pictures; `hues` are their directions among the two chromas."""
 

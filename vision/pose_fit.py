@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hil.core.types import Pose, wrap_pi
+from vision import _marks
+
+if TYPE_CHECKING:
+    from hil.core.types import Covariance
+    from vision._marks import Spot
 
 Array = NDArray[np.float64]
 
-WEIGHTED_STEPS = 2  # of Gauss and Newton from the unweighted pose
+Point = tuple[float, float]
 
 
 def fit_pose(body_m: ArrayLike, world_m: ArrayLike) -> tuple[Pose, float]:
@@ -22,12 +28,6 @@ def fit_pose(body_m: ArrayLike, world_m: ArrayLike) -> tuple[Pose, float]:
     """
     body = np.asarray(body_m, dtype=np.float64)
     world = np.asarray(world_m, dtype=np.float64)
-    pose, turn, b, w = _fitted(body, world)
-    return pose, float(np.sqrt(np.mean(np.sum((b @ turn.T - w) ** 2, axis=1))))
-
-
-def _fitted(body: Array, world: Array) -> tuple[Pose, Array, Array, Array]:
-    """Return the pose, its rotation, and both patterns about their middles."""
     b0, w0 = np.add.reduce(body) / len(body), np.add.reduce(world) / len(world)
     b, w = body - b0, world - w0
     across = np.add.reduce(b[:, 0] * w[:, 1] - b[:, 1] * w[:, 0])
@@ -35,34 +35,16 @@ def _fitted(body: Array, world: Array) -> tuple[Pose, Array, Array, Array]:
     c, s = math.cos(theta), math.sin(theta)
     turn = np.array([[c, -s], [s, c]])
     x, y = (w0 - turn @ b0).tolist()
-    return Pose(x, y, theta), turn, b, w
+    return Pose(x, y, theta), float(np.sqrt(np.mean(np.sum((b @ turn.T - w) ** 2, axis=1))))
 
 
 def weighted_pose(
-    body_m: ArrayLike, world_m: ArrayLike, covariances_m2: ArrayLike
-) -> tuple[Pose, Array, float]:
-    """Return the pose that takes body points, (N, 2), to world points of known covariance.
+    body_m: tuple[Point, Point], one: Spot, other: Spot
+) -> tuple[Pose, Covariance, float]:
+    """Return the pose that takes two points of the robot, (x, y), to spots of known covariance.
 
-    `covariances_m2` is (N, 2, 2). Also returned: the covariance of (x_m, y_m, theta_rad), (3, 3),
-    and the weighted sum of squares that is left, with 2 N - 3 degrees of freedom.
+    Also returned: the covariance of (x_m, y_m, theta_rad), and the weighted sum of squares that is left,
+    with one degree of freedom. Two steps of Gauss and Newton from the unweighted pose.
     """
-    body, world = np.asarray(body_m, np.float64), np.asarray(world_m, np.float64)
-    weight = np.linalg.inv(np.asarray(covariances_m2, np.float64))
-    start = _fitted(body, world)[0]
-    x_m, y_m, theta_rad = start.x_m, start.y_m, start.theta_rad
-    slopes = np.zeros((len(body), 2, 3))
-    slopes[:, 0, 0] = slopes[:, 1, 1] = 1.0
-    rest = covariance = np.empty(0)
-    for step in range(WEIGHTED_STEPS + 1):
-        c, s = math.cos(theta_rad), math.sin(theta_rad)
-        arms = body @ np.array([[c, s], [-s, c]])
-        rest = world - arms - (x_m, y_m)
-        if step == WEIGHTED_STEPS:
-            break
-        slopes[:, 0, 2], slopes[:, 1, 2] = -arms[:, 1], arms[:, 0]
-        turned = slopes.transpose(0, 2, 1) @ weight
-        covariance = np.linalg.inv((turned @ slopes).sum(axis=0))
-        dx, dy, turn = (covariance @ (turned @ rest[..., None]).sum(axis=0))[:, 0].tolist()
-        x_m, y_m, theta_rad = x_m + dx, y_m + dy, theta_rad + turn
-    left = float(np.sum(rest[:, None] @ weight @ rest[..., None]))
+    x_m, y_m, theta_rad, covariance, left = _marks.weighted_pose(body_m, one, other)
     return Pose(x_m, y_m, wrap_pi(theta_rad)), covariance, left

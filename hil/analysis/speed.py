@@ -48,8 +48,18 @@ def peak_memory_mb() -> float:
 
     The system's own figure for a child begins with what its parent had, so the process's is asked for first.
     """
+    return _told_mb("VmHWM:") or resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def memory_mb() -> float:
+    """Return the memory that this process has now, MB; the largest it had where the system does not say."""
+    return _told_mb("VmRSS:") or peak_memory_mb()
+
+
+def _told_mb(what: str) -> float:
+    """Return what Linux says of this process, MB; 0 where it does not."""
     with suppress(OSError):
         for line in Path("/proc/self/status").read_text(encoding="utf-8").splitlines():
-            if line.startswith("VmHWM:"):
+            if line.startswith(what):
                 return float(line.split()[1]) / 1024.0
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    return 0.0

@@ -6,6 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from hil.core.rig import Frame
     from hil.core.types import PoseMeasurement
 
@@ -34,5 +36,10 @@ def frame_row(
         measurement.sigma_xy_m,
         measurement.sigma_theta_rad,
         *(measurement.covariance or _NO_COVARIANCE),
-        *(tuple([details.get(name, _NAN) for name in MARKS]) if details else _NO_MARKS),
+        *(marks_of(details) if details else _NO_MARKS),
     )
+
+
+def marks_of(details: Mapping[str, float]) -> tuple[float, ...]:
+    """Return where a measurement's details say that the marks are, px; NaN for what they do not say."""
+    return tuple([details.get(name, _NAN) for name in MARKS])

@@ -12,6 +12,7 @@ from hil.core.types import Estimate, OuterCommand, Pose, Vec2
 from hil.wire._wire import Link, WheelReport
 
 _Note = Callable[[str, str], None]
+_Eye = Callable[[tuple[float, float, float] | None], tuple[object, ...]]
 
 REACTIONS: tuple[str, ...]
 REACHED: int
@@ -134,7 +135,14 @@ class Pump:
 
     now_s: float
     def __init__(
-        self, rig: object, link: Link, camera: CameraClock, fused: Fused, watch: Watch, note: _Note
+        self,
+        rig: object,
+        link: Link,
+        camera: CameraClock,
+        fused: Fused,
+        watch: Watch,
+        note: _Note,
+        eye: _Eye,
     ) -> None: ...
     def begin(self, until_s: float, busy: bool) -> int: ...
     def begin_periods(self, period_s: float, last_s: float) -> int: ...

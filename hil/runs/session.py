@@ -65,7 +65,7 @@ class Session:
 
         self._note = note  # no method: native parts keep it, and know nothing of this session
         self._watch = make_watch(scenario, parts, note)
-        self._pump = make_pump(parts, self._watch, note)
+        self._pump = make_pump(parts, self._watch, note, scenario.camera)
         self._intake = Intake(scenario.camera, parts, self._watch, note, self._pump)
         self._format = _native.RowFormat(TRACE_KEYS, parts.own_terms)
         self.error: Exception | SystemExit | None = None  # what ended the run and is no rig fault

@@ -17,20 +17,24 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from hil.control.estimators.fused import Fused
+from hil.control.estimators.fused import Fused, excess
 from hil.control.vehicles.vehicle import TwoSided
 from hil.core.rig import whole
+from hil.core.types import Pose
 from hil.record.memory import MemoryRecorder
+from hil.record.tick_rows import marks_of
 from hil.runs import _native
 
 if TYPE_CHECKING:
+    from hil.config.camera import CameraConfig
     from hil.config.scenario import ReactionsConfig, Scenario
-    from hil.core.rig import Frame
+    from hil.core.rig import Frame, Picture
     from hil.runs.parts import Parts
 
 Note = Callable[[str, str], None]
+PoseTuple = tuple[float, float, float]
 DIAGNOSIS = "diagnosis"  # kind of the record's events that the verdict repeats
 # Of every how many rows and columns of an image one is compared with the image before.
 _EVERY = 16
@@ -60,11 +64,13 @@ def make_watch(scenario: Scenario, parts: Parts, note: Note) -> _native.Watch:
     )
 
 
-def make_pump(parts: Parts, watch: _native.Watch, note: Note) -> _native.Pump | None:
-    """Return what takes bytes and frames in without a step into Python; None where somebody asks for them.
+def make_pump(
+    parts: Parts, watch: _native.Watch, note: Note, camera: CameraConfig
+) -> _native.Pump | None:
+    """Return what takes bytes and frames in natively; None where somebody asks for them.
 
-    It needs a simulated rig that gives poses, the default estimator itself, wheels as that believes them to
-    be, and a record in memory.
+    It needs a simulated rig that native code drives, the default estimator itself, wheels as that believes
+    them to be, and a record in memory. Into Python it steps for pictures.
     """
     handle = getattr(parts.rig, "native", None)
     sink = parts.recorder
@@ -76,7 +82,36 @@ def make_pump(parts: Parts, watch: _native.Watch, note: Note) -> _native.Pump | 
     two_sided = getattr(type(parts.vehicle), "wheels", None) is TwoSided.wheels
     if rig is None or not two_sided:
         return None
-    return _native.Pump(rig, parts.link.native, parts.camera_clock, parts.estimator, watch, note)
+    eye = _eye(parts, camera)
+    return _native.Pump(
+        rig, parts.link.native, parts.camera_clock, parts.estimator, watch, note, eye
+    )
+
+
+def _eye(parts: Parts, camera: CameraConfig) -> Callable[[PoseTuple | None], tuple[Any, ...]]:
+    """Return what finds the robot in the picture of the frame that native code took last.
+
+    It is given where the robot is expected, if that is known, and returns what native/bindings.cpp takes.
+    """
+    locate, radius_m, rig = parts.localiser.locate, camera.search_radius_m, parts.rig
+
+    def look(expected: PoseTuple | None) -> tuple[Any, ...]:
+        picture: Picture = rig.picture()  # type: ignore[attr-defined] # of those rigs that have a pump
+        predicted = None if expected is None else Pose(*expected)
+        seen = locate(picture, predicted, radius_m)
+        pose, details = seen.pose, seen.details
+        return (
+            None if pose is None else (pose.x_m, pose.y_m, pose.theta_rad),
+            seen.quality,
+            seen.sigma_xy_m,
+            seen.sigma_theta_rad,
+            seen.reason,
+            None if pose is None else excess(seen),
+            seen.covariance,
+            marks_of(details) if details else None,
+        )
+
+    return look
 
 
 def picture_of(frame: Frame) -> bytes:

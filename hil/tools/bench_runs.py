@@ -23,6 +23,7 @@ from hil.core.registries import OUTER_LAWS
 from hil.rigs.opening import open_rig
 from hil.runs.execute import InMemory, RunSpec, execute_in_memory
 from hil.runs.together import run_together
+from hil.tools.bench_plants import plant_figures
 from sim_twin.setup import STEP_US, make_kernel
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from hil.core.types import OuterLaw
 
 _X = "x real time"
+_LARGE = ("camera.width_px=1280", "camera.height_px=720")
 _STEPS = 20_000
 _DRIVING = (0.5, 0.3)  # duties of the plant alone
 
@@ -42,9 +44,10 @@ NATIVE, ASKED, PYTHON, TOGETHER = range(4)
 
 
 def batch_figures(runs: int) -> list[Figure]:
-    """Return what one core does along each path that a run can take, and the plant alone."""
+    """Return what one core does along each path of a run, and the plant alone beside its peers."""
     standing = load_scenario("scenario-1", ["duration_s=10"])
     driving = load_scenario("circle", ["duration_s=10"])
+    large = load_scenario("scenario-1", [*_LARGE, "duration_s=20"])
     plans: list[Plan] = []
     for what, scenario, camera, way in (
         (f"{SIDE_BY_SIDE} side by side, 10 s to a point", standing, "pose", TOGETHER),
@@ -55,7 +58,9 @@ def batch_figures(runs: int) -> list[Figure]:
         ("pose camera, 10 s on a circle", driving, "pose", NATIVE),
         ("the circle, its law in Python", driving, "pose", ASKED),
         ("the circle, taken in by Python", driving, "pose", PYTHON),
-        ("rendered camera, 10 s to a point", standing, "rendered", PYTHON),
+        ("rendered camera, 10 s to a point", standing, "rendered", NATIVE),
+        ("rendered camera 1280 x 720, 20 s to a point", large, "rendered", NATIVE),
+        ("the same 1280 x 720, taken in by Python", large, "rendered", PYTHON),
     ):
         plans += [
             (what, _X, "", _times_real_time(scenario, camera, "asg-ism", way)),
@@ -67,7 +72,8 @@ def batch_figures(runs: int) -> list[Figure]:
          lambda: 1e6 / kernel_us_a_s(True)),
         ("plant alone, driving", _X, "", lambda: 100.0 / plant_step_us()),
     ]  # fmt: skip
-    return [measure(name, unit, goal, runs, once) for name, unit, goal, once in plans]
+    measured = [measure(name, unit, goal, runs, once) for name, unit, goal, once in plans]
+    return [*measured, *plant_figures(runs)]
 
 
 def law_figures(runs: int) -> list[Figure]:

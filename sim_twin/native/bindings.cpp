@@ -14,6 +14,7 @@
 #include <stdexcept>
 
 #include "kernel.hpp"
+#include "processor.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -53,6 +54,19 @@ twin::Drive duty(double left, double right) {
   twin::Drive drive;
   drive.duty = twin::Pair{left, right};
   return drive;
+}
+
+void bind_processor(nb::module_& m) {
+  m.attr("CHAINS") = names({"sum", "product", "quotient", "root", "sine"});
+  m.def(
+      "chained",
+      [](int chain, std::int64_t operations) {
+        if (chain < 0 || chain >= twin::kChains) throw nb::value_error("chain: not one of CHAINS");
+        return twin::chained(static_cast<twin::Chain>(chain), operations);
+      },
+      "chain"_a, "operations"_a);
+  m.def("widest_register", &twin::widest_register);
+  m.def("side_by_side", &twin::side_by_side, "width"_a, "operations"_a, "quotients"_a = false);
 }
 
 void bind_plant(nb::module_& m) {
@@ -237,6 +251,7 @@ void bind_kernel(nb::module_& m) {
 
 NB_MODULE(_native, m) {
   bind_names(m);
+  bind_processor(m);
   bind_plant(m);
   bind_kernel(m);
   bind_lanes(m);

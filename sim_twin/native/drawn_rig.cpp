@@ -3,6 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "lanes.hpp"
@@ -56,25 +57,17 @@ void DrawnRig::move_together(Wait* waits, std::size_t count) {
 }
 
 bool DrawnRig::take_frame(core::PoseFrame& frame) {
-  const auto taken = rig_.take_frame();
+  auto taken = rig_.take_frame();
   if (!taken) return false;
-  const Exposure& exposure = taken->exposure;
+  const Exposure exposure = taken->exposure;
   bool repeated = false;
   for (const Span& span : repeats_) repeated = repeated || within(span, exposure.start_s);
   if (!repeated || !last_) {
     last_ = core::PoseFrame{};
-    if (taken->poses.empty()) {
-      last_->reason = "hidden from the camera";
-    } else if (const auto seen = drawn_.measure(taken->poses.front())) {
-      last_->seen = true;
-      last_->x_m = seen->x_m;
-      last_->y_m = seen->y_m;
-      last_->theta_rad = seen->theta_rad;
-      last_->quality = claim_.quality;
-      last_->sigma_xy_m = claim_.sigma_xy_m;
-      last_->sigma_theta_rad = claim_.sigma_theta_rad;
+    if (poses_ > 0) {
+      show(*std::move(taken));
     } else {
-      last_->reason = "not seen (drawn)";
+      see(*taken);
     }
   }
   last_->index = exposure.index;
@@ -84,6 +77,32 @@ bool DrawnRig::take_frame(core::PoseFrame& frame) {
   for (const auto& [size_s, span] : stamp_steps_) step_s += within(span, exposure.start_s) ? size_s : 0.0;
   if (step_s != 0.0) frame.t_cam_s += step_s;
   return true;
+}
+
+// Draws what the localiser says of a frame.
+void DrawnRig::see(const Exposed& taken) {
+  if (taken.poses.empty()) {
+    last_->reason = "hidden from the camera";
+  } else if (const auto seen = drawn_.measure(taken.poses.front())) {
+    last_->seen = true;
+    last_->x_m = seen->x_m;
+    last_->y_m = seen->y_m;
+    last_->theta_rad = seen->theta_rad;
+    last_->quality = claim_.quality;
+    last_->sigma_xy_m = claim_.sigma_xy_m;
+    last_->sigma_theta_rad = claim_.sigma_theta_rad;
+  } else {
+    last_->reason = "not seen (drawn)";
+  }
+}
+
+// Keeps what a picture shows. Its number and poses tell it from others: no two have the same noise.
+void DrawnRig::show(Exposed taken) {
+  last_->pictured = true;
+  last_->picture.assign(reinterpret_cast<const char*>(&taken.exposure.index), sizeof(taken.exposure.index));
+  last_->picture.append(reinterpret_cast<const char*>(taken.poses.data()),
+                        taken.poses.size() * sizeof(PoseSample));
+  shown_ = std::move(taken);
 }
 
 core::Truth DrawnRig::truth() const {

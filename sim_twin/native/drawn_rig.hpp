@@ -1,4 +1,5 @@
-// The simulated rig with drawn poses for a camera, as the host's native code meets it.
+// The simulated rig as the host's native code meets it: its frames bring drawn poses, or pictures that are drawn
+// where somebody looks (sim_twin/camera_sim.py).
 #pragma once
 
 #include <optional>
@@ -19,8 +20,9 @@ struct Claim {
 
 class DrawnRig final : public core::SimulatedRig {
  public:
-  DrawnRig(Rig& rig, DrawnPoses& drawn, const Claim& claim, core::LineBacklog& backlog)
-      : rig_(rig), drawn_(drawn), claim_(claim), backlog_(backlog) {}
+  // A picture takes `poses` poses of its exposure along; with 0 of them frames bring drawn poses.
+  DrawnRig(Rig& rig, DrawnPoses& drawn, const Claim& claim, core::LineBacklog& backlog, int poses)
+      : rig_(rig), drawn_(drawn), claim_(claim), backlog_(backlog), poses_(poses) {}
 
   // Host times between which frames repeat the one before, and by how much their stamps are off in others.
   void set_faults(std::vector<Span> repeats, std::vector<std::pair<double, Span>> stamp_steps) {
@@ -31,7 +33,7 @@ class DrawnRig final : public core::SimulatedRig {
   double now_s() const override { return rig_.now_s(); }
   void wait(double until_s) override;
   void move(double until_s) override;
-  bool arrived(double until_s) override { return rig_.arrive(until_s, 1); }
+  bool arrived(double until_s) override { return rig_.arrive(until_s, poses_ > 0 ? poses_ : 1); }
   void move_together(Wait* waits, std::size_t count) override;
   std::string read() override { return rig_.read(); }
   void write(const std::string& data) override {
@@ -40,15 +42,22 @@ class DrawnRig final : public core::SimulatedRig {
   }
   bool take_frame(core::PoseFrame& frame) override;
   core::Truth truth() const override;
+  // What the picture of the frame taken last shows: of one that repeats the frame before, that one's.
+  const std::optional<Exposed>& shown() const { return shown_; }
 
  private:
+  void see(const Exposed& taken);
+  void show(Exposed taken);
+
   Rig& rig_;
   DrawnPoses& drawn_;
   Claim claim_;
   core::LineBacklog& backlog_;
+  int poses_;
   std::vector<Span> repeats_;
   std::vector<std::pair<double, Span>> stamp_steps_;
   std::optional<core::PoseFrame> last_;
+  std::optional<Exposed> shown_;
 };
 
 }  // namespace twin

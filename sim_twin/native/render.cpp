@@ -6,11 +6,12 @@
 #include <cstring>
 
 #include "render_ids.hpp"
+#include "render_wide.hpp"
 
 namespace camera {
 namespace {
 
-constexpr int SETS = 64, PER_SET = 24, SAMPLES_BACKGROUND = 8;
+constexpr int SAMPLES_BACKGROUND = 8;
 // An edge is sampled as its contrast deserves: of a mark, of others, between two shades of black.
 constexpr int SAMPLES_MARK = PER_SET, SAMPLES_PLAIN = 8, SAMPLES_FAINT = 4;
 constexpr int SLOTS = 8;
@@ -18,14 +19,6 @@ constexpr int BANK = 1 << 18;
 constexpr float NORMAL_STEPS = 6000.0f;  // of one standard deviation; 5.4 of them fit
 constexpr float DN_STEPS = 64.0f;
 constexpr float DN_MAX = 319.0f, SIGMA_MAX_DN = 30.0f;  // so that level plus noise fits 16 bits
-
-// Counter-based: the value depends on the arguments alone (splitmix64).
-uint64_t hash(uint64_t a, uint64_t b, uint64_t c) {
-  uint64_t z = a + 0x9e3779b97f4a7c15ull * (b + 1) + 0xd1b54a32d192ed03ull * (c + 1);
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-  return z ^ (z >> 31);
-}
 
 double unit(uint64_t bits) { return (static_cast<double>(bits >> 11) + 0.5) * 0x1p-53; }
 
@@ -45,14 +38,7 @@ double pixel_offset(double p, double sigma) {
   return 0.5 * (lo + hi);
 }
 
-// Every pixel of a frame goes through these two: wide registers where the processor has them, found out
-// at run time. Whole numbers, roots and single products have the same bits in any width.
-#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
-#define CAMERA_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define CAMERA_WIDE
-#endif
-
+// Every pixel of a frame goes through these two.
 CAMERA_WIDE void quantised(const float* dn, int count, float read2, float shot, int16_t* level,
                            int16_t* sigma) {
   for (int i = 0; i < count; ++i) {
@@ -80,7 +66,8 @@ Window common(const Window& a, const Window& b) {
 }
 
 Renderer::Renderer(const View& view, const Scene& scene, const Robot& robot, uint64_t seed)
-    : view_(view), scene_(scene), robot_(robot), seed_(seed) {
+    : view_(view), scene_(scene), robot_(robot), outline_(robot),
+      from_above_(scene.bars.empty() && robot.tag.cells == 0), seed_(seed) {
   for (Block& block : scene_.blocks) {
     block.c = std::cos(block.theta);
     block.s = std::sin(block.theta);
@@ -163,6 +150,22 @@ void Renderer::sample_table() {
       samples_.push_back({-du, -dv, SLOTS - 1 - slot});
     }
   }
+}
+
+void Renderer::date_samples() {
+  dated_.resize(SETS);
+  for (int set = 0; set < SETS; ++set)
+    for (int i = 0; i < PER_SET; ++i) {
+      const Sample& sample = samples_[static_cast<size_t>(set) * PER_SET + i];
+      const Pose& pose = slots_[sample.slot];
+      Samples& to = dated_[set];
+      to.du[i] = sample.du;
+      to.dv[i] = sample.dv;
+      to.x[i] = pose.x;
+      to.y[i] = pose.y;
+      to.c[i] = pose.c;
+      to.s[i] = pose.s;
+    }
 }
 
 void Renderer::noise_bank() {
@@ -254,7 +257,7 @@ void Renderer::composite_pixel(int u, int v, uint8_t flags, uint8_t id, float sh
   if (flags & EDGE) {
     count = flags & EDGE_MARK ? SAMPLES_MARK : flags & EDGE_PLAIN ? SAMPLES_PLAIN : SAMPLES_FAINT;
     uint8_t hits[PER_SET];
-    trace_samples(u, v, &samples_[hash(2, u, v) % SETS * PER_SET], count, flags, hits);
+    trace_samples(u, v, count, flags, hits);
     for (int i = 0; i < count; ++i) {
       floor += hits[i] == ID_FLOOR;
       for (int k = 0; k < 3; ++k) sum[k] += colour_of_id_[hits[i]][k];
@@ -358,6 +361,7 @@ void Renderer::draw(uint64_t index, const std::vector<std::array<double, 3>>& po
     const std::vector<Pose> drawn = slots_of(poses);
     if (!same(drawn, slots_)) {
       slots_ = drawn;
+      date_samples();
       set_windows();
       parts_.clear();
     }

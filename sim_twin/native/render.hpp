@@ -118,6 +118,21 @@ struct Sample {
   int slot = 0;
 };
 
+constexpr int PER_SET = 24;  // samples of a pixel, at most
+
+// The same for all samples of a pixel, with the robot's poses then.
+struct Samples {
+  std::array<float, PER_SET> du, dv, x, y, c, s;
+};
+
+// The robot seen from above: its plate with what lies on it, and how far anything of it reaches. No bars, no tag.
+struct Outline {
+  float top, half_length, half_width, reach_x, reach_y;
+  std::vector<Patch> patches;
+
+  explicit Outline(const Robot& robot);
+};
+
 // Columns u0 to u1 - 1 of rows v0 to v1 - 1.
 struct Window {
   int u0, v0, u1, v1;
@@ -164,7 +179,9 @@ class Renderer {
   Part composite(const Window& w);
   void classify(const Window& w);
   void composite_pixel(int u, int v, uint8_t flags, uint8_t id, float shade, float* dn) const;
-  void trace_samples(int u, int v, const Sample* samples, int count, uint8_t flags, uint8_t* hits) const;
+  void trace_samples(int u, int v, int count, uint8_t flags, uint8_t* hits) const;
+  void trace_row(const Sight* sights, int count, const Pose& pose, uint8_t* ids) const;
+  void date_samples();
   uint8_t trace(const Sight& world, const Pose& pose) const;
   uint8_t trace_top(float x, float y) const;
   uint8_t trace_sides(const Sight& body) const;
@@ -175,12 +192,15 @@ class Renderer {
   View view_;
   Scene scene_;
   Robot robot_;
+  Outline outline_;
+  bool from_above_;  // nothing but what the outline has can be met
   uint64_t seed_;
   Shared<Sight> sight_;                // per pixel centre
   Shared<float> floor_dn_, glare_dn_;  // background before noise: what shade takes, the rest
   Shared<int16_t> level_, sigma_;      // the same in the noise stage's steps
   std::vector<int16_t> normal_;
   std::vector<Sample> samples_;
+  std::vector<Samples> dated_;  // the same, set by set, for the poses in `slots_`
   std::vector<Colour> colour_of_id_;
   std::vector<uint8_t> mark_id_, edge_of_ids_;
   int reach_ = 1;  // px that the lens blur carries an edge

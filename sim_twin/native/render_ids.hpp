@@ -22,4 +22,14 @@ constexpr uint8_t EDGE = 1, EDGE_SIDES = 2, EDGE_MARK = 4, EDGE_PLAIN = 8;
 
 constexpr float SHADE_REACH_M = 0.06f;  // penumbra of the robot on the floor: a lamp 1 m wide
 
+constexpr int SETS = 64;  // of samples, one of which a pixel takes
+
+// Counter-based: the value depends on the arguments alone (splitmix64).
+inline uint64_t hash(uint64_t a, uint64_t b, uint64_t c) {
+  uint64_t z = a + 0x9e3779b97f4a7c15ull * (b + 1) + 0xd1b54a32d192ed03ull * (c + 1);
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+  return z ^ (z >> 31);
+}
+
 }  // namespace camera

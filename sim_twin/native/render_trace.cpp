@@ -4,6 +4,7 @@
 
 #include "render.hpp"
 #include "render_ids.hpp"
+#include "render_wide.hpp"
 
 namespace camera {
 namespace {
@@ -149,13 +150,12 @@ void Renderer::classify(const Window& w) {
   const bool still = std::fabs(first.x - last.x) + std::fabs(first.y - last.y) +
                          robot_radius_ * std::fabs(first.s - last.s) <
                      1e-4f;
-  for (int j = 0; j < rows; ++j)
-    for (int i = 0; i < columns; ++i) {
-      const Sight& s = sight_[static_cast<size_t>(w.v0 + j) * view_.width + w.u0 + i];
-      const size_t at = static_cast<size_t>(j) * columns + i;
-      id_first_[at] = trace(s, first);
-      id_last_[at] = still ? id_first_[at] : trace(s, last);
-    }
+  for (int j = 0; j < rows; ++j) {
+    const Sight* sights = &sight_[static_cast<size_t>(w.v0 + j) * view_.width + w.u0];
+    trace_row(sights, columns, first, &id_first_[static_cast<size_t>(j) * columns]);
+    if (!still) trace_row(sights, columns, last, &id_last_[static_cast<size_t>(j) * columns]);
+  }
+  if (still) id_last_ = id_first_;
   const size_t ids = colour_of_id_.size();
   const auto mark_edge = [&](size_t a, uint8_t id_a, size_t b, uint8_t id_b) {
     if (id_a == id_b) return;
@@ -189,10 +189,29 @@ void Renderer::classify(const Window& w) {
         flags_[static_cast<size_t>(j) * columns + i] |= flags_row_[static_cast<size_t>(j + d) * columns + i];
 }
 
-void Renderer::trace_samples(int u, int v, const Sample* samples, int count, uint8_t flags,
-                             uint8_t* hits) const {
+// What lines of sight meet, each by itself or all together.
+void Renderer::trace_row(const Sight* sights, int count, const Pose& pose, uint8_t* ids) const {
+  if (!from_above_) {
+    for (int i = 0; i < count; ++i) ids[i] = trace(sights[i], pose);
+    return;
+  }
+  meet_row(outline_, pose, sights, count, ids);
+  for (int i = 0; i < count; ++i)
+    if (ids[i] == ID_ASIDE) ids[i] = trace_sides(in_body(sights[i], pose));
+}
+
+void Renderer::trace_samples(int u, int v, int count, uint8_t flags, uint8_t* hits) const {
   const SightPatch patch = sight_patch(u, v);
+  const size_t set = hash(2, u, v) % SETS;
+  const Sample* samples = &samples_[set * PER_SET];
   const float top = robot_.top;
+  if (from_above_) {
+    meet_samples(outline_, patch, dated_[set], count, !(flags & EDGE_SIDES), hits);
+    for (int i = 0; i < count; ++i)
+      if (hits[i] == ID_ASIDE)
+        hits[i] = trace_sides(in_body(patch.at(samples[i].du, samples[i].dv), slots_[samples[i].slot]));
+    return;
+  }
   for (int i = 0; i < count; ++i) {
     const Sight s = patch.at(samples[i].du, samples[i].dv);
     const Pose& p = slots_[samples[i].slot];

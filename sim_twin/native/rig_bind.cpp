@@ -52,13 +52,24 @@ nb::object measured(twin::DrawnPoses& drawn, double x_m, double y_m, double thet
   return seen ? nb::object(pose_tuple(*seen)) : nb::none();
 }
 
+nb::tuple tuple_of(const std::vector<twin::PoseSample>& poses) {
+  nb::list out;
+  for (const twin::PoseSample& pose : poses) out.append(pose_tuple(pose));
+  return nb::tuple(out);
+}
+
 nb::object taken(twin::Rig& rig) {
   const auto frame = rig.take_frame();
   if (!frame) return nb::none();
-  nb::list poses;
-  for (const twin::PoseSample& pose : frame->poses) poses.append(pose_tuple(pose));
   return nb::make_tuple(frame->exposure.index, frame->exposure.start_s, frame->exposure.t_cam_s,
-                        nb::tuple(poses));
+                        tuple_of(frame->poses));
+}
+
+// Number, begin and poses of the exposure that the picture of the last frame shows; None without one.
+nb::object shown(const twin::DrawnRig& rig) {
+  if (!rig.shown()) return nb::none();
+  const auto& [exposure, poses] = *rig.shown();
+  return nb::make_tuple(exposure.index, exposure.start_s, tuple_of(poses));
 }
 
 // Number, stamp, pose (None where the robot was not seen), and why not.
@@ -156,13 +167,15 @@ void bind_rig(nb::module_& m) {
       .def(
           "__init__",
           [](DrawnRig* self, Rig& rig, twin::DrawnPoses& drawn, core::LineBacklog& backlog, double quality,
-             double sigma_xy_m, double sigma_theta_rad, double true_d0_m) {
-            new (self) DrawnRig(rig, drawn, {quality, sigma_xy_m, sigma_theta_rad, true_d0_m}, backlog);
+             double sigma_xy_m, double sigma_theta_rad, double true_d0_m, int poses) {
+            new (self)
+                DrawnRig(rig, drawn, {quality, sigma_xy_m, sigma_theta_rad, true_d0_m}, backlog, poses);
           },
           nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(), "rig"_a, "drawn"_a,
-          "backlog"_a, "quality"_a, "sigma_xy_m"_a, "sigma_theta_rad"_a, "true_d0_m"_a)
+          "backlog"_a, "quality"_a, "sigma_xy_m"_a, "sigma_theta_rad"_a, "true_d0_m"_a, "poses"_a)
       .def("set_faults", &DrawnRig::set_faults, "repeats"_a, "stamp_steps"_a)
       .def("take_frame", &drawn_frame)
+      .def("shown", &shown)
       .def("handle", [](DrawnRig& rig) {
         return nb::capsule(static_cast<core::SimulatedRig*>(&rig), core::kSimulatedRig);
       });

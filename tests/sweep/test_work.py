@@ -299,10 +299,22 @@ def test_jobs_are_made_when_asked_for(campaign: Campaign) -> None:
 def test_growth_is_told_by_its_slope() -> None:
     """Of points on a line: its slope and its unit; of one point no slope."""
     line = growth.Series("run", "s of run", "MB", (10.0, 110.0, 210.0), (1.0, 3.0, 5.0))
-    *points, slope = line.figures()
+    *points, slope, begin = line.figures()
     assert [figure.median for figure in points] == [1.0, 3.0, 5.0]
     assert (slope.unit, slope.median) == ("MB per s of run", pytest.approx(0.02))
+    assert (begin.unit, begin.median) == ("MB", pytest.approx(0.8))
     assert len(growth.Series("run", "s of run", "MB", (10.0,), (1.0,)).figures()) == 1
+
+
+def test_a_long_run_tells_its_memory_on_the_way() -> None:
+    """A recorded run in a process of its own: twenty times evenly over it, never above the largest."""
+    run = growth.recorded_run(20)
+    times_s, memory_mb = zip(*run.course, strict=True)
+    assert times_s == pytest.approx(np.arange(1.0, 21.0), abs=0.04)
+    assert min(memory_mb) > 20.0
+    assert max(memory_mb) <= run.peak_mb
+    assert run.cpu_s > 0.0
+    assert run.disk_mb > 0.1
 
 
 def test_growth_is_drawn(tmp_path: Path) -> None:
@@ -311,8 +323,12 @@ def test_growth_is_drawn(tmp_path: Path) -> None:
         growth.Series(what, over, "s", (1.0, 2.0), (3.0, 6.0))
         for what, over in (("a run", "s of run"), ("rows together", "rows"), ("rate", "workers"))
     ]
+    found.append(growth.Series("falls", "runs", "s", (0.0, 2.0), (3.0, 1.0)))
     growth.write_plot(tmp_path / "a.svg", found)
     growth.write_plot(tmp_path / "b.svg", found)
     text = (tmp_path / "a.svg").read_text(encoding="utf-8")
     assert all(series.what in text for series in found)
+    # The constants of each line stand beside it: 0 + 3 x, and 3 - 1 x.
+    assert "+ 3 t" in text
+    assert "falls, s: 3 - 1 n" in text
     assert text == (tmp_path / "b.svg").read_text(encoding="utf-8")

@@ -9,8 +9,9 @@ import pytest
 
 from hil.analysis.speed import Figure
 from hil.study.campaign import speed
-from hil.tools import bench_history, bench_runs
+from hil.tools import bench_history, bench_plants, bench_runs
 from hil.tools.bench import FORMAT, as_document
+from sim_twin import _native
 from tests.cli.command import hil
 
 
@@ -23,6 +24,10 @@ def figure(name: str, *values: float) -> Figure:
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make what is timed short; the rendered path and long tables are left to the command itself."""
     monkeypatch.setattr(bench_runs, "_STEPS", 200)
+    for name in ("_NATIVE_STEPS", "_LANE_STEPS", "_MUJOCO_STEPS", "_CHAINED", "_SIDE_BY_SIDE"):
+        monkeypatch.setattr(bench_plants, name, 100_000 if name == "_SIDE_BY_SIDE" else 300)
+    monkeypatch.setattr(bench_plants, "_PORT_STEPS", 1)
+    monkeypatch.setattr(bench_plants, "_installed", lambda package: package == "mujoco")
 
     def worked(*_run: object) -> tuple[float, int]:
         assert sum(range(50_000)) > 0  # takes a while
@@ -43,7 +48,12 @@ def test_batch_says_runs_and_times_real_time_of_each_path() -> None:
     assert done.json["program"].startswith("skid-steer-hil ")
     assert done.json["machine"]["cores"] >= 1
     found = {(item["name"], item["unit"]): item for item in done.json["figures"]}
-    assert len(found) == 21  # four ways of the pose camera, two tasks; rendered; plant and kernel
+    registers = {2, 4, _native.widest_register()}
+    # Four ways of the pose camera, two tasks; rendered in two sizes; plant and kernel; peers; limits.
+    plants = 2 + len(_native.lane_widths()) + 2 + 3 * len(registers)
+    assert len(found) == 25 + plants
+    assert ("MuJoCo, four wheels, one step of 0.0005 s", "ns") in found
+    assert ("the same in numba", "ns") not in found  # what is not installed is left out
     assert ("the same, taken in by Python", "x real time") in found
     for item in found.values():
         assert len(item["values"]) == item["runs"] == 3
@@ -121,7 +131,7 @@ def test_against_a_file_of_this_command_compares_and_any_other_is_refused(tmp_pa
     file.write_text(json.dumps(hil("bench", "batch", "--runs", 2, "--json").json), encoding="utf-8")
     done = hil("bench", "batch", "--runs", 2, "--against", file, "--json")
     assert done.status == 0
-    assert len(done.json["against"]) == 21
+    assert len(done.json["against"]) == len(done.json["figures"]) > 17
     assert all(item["low"] <= item["ratio"] * 1.001 for item in done.json["against"])
     assert "now / then" in hil("bench", "batch", "--runs", 1, "--against", file).out
     other = tmp_path / "other.json"

@@ -176,6 +176,11 @@ def test_what_the_task_asks_for_moves_with_its_start(tmp_path):
     assert (turned["turn_rad"].min, turned["turn_rad"].max) == pytest.approx((-2.3416, 0.6))
     assert turned["start_offset_x_m"].max == pytest.approx(-0.2 + 0.0215, abs=2e-4)
     assert turned["delta1_worst_last_second_m"] == usual["delta1_worst_last_second_m"]
+    # turned 0.8 rad to the left the point is 1.55 rad to the right: it may be met in reverse, by +1.59 rad
+    beside = {r.metric: r for r in box.at((1.0, 0.5)).requirements}
+    assert (beside["turn_rad"].min, beside["turn_rad"].max) == pytest.approx(
+        (-3.9416, 2.1416), abs=1e-3
+    )
     moved = {r.metric: r for r in box.at((0.5, 1.0)).requirements}
     assert moved["turn_rad"].max == pytest.approx(-0.2 + 0.887 - 0.822, abs=1e-3)
     assert moved["start_offset_x_m"].max == pytest.approx(-0.12)

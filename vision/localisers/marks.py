@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from hil.config.camera import MarkConfig, MarksConfig
 from hil.core.types import Pose, PoseMeasurement
+from vision._marks import Spot, gap_variance, spot
 from vision.camera import CameraModel, longest_px
-from vision.disc_fit import Disc, Marks, RimFitter
+from vision.disc_fit import Disc, Marks, RimFitter, compiled
 from vision.mark_search import CHROMA_BASIS, Centres, MarkSearch, Point, Window
 from vision.pose_fit import weighted_pose
 
@@ -52,7 +53,6 @@ QUALITY_RESIDUAL = 0.06  # of the radius
 # What is hardly within each limit is no robot: the least of extreme blur and noise has 0.17.
 QUALITY_MIN = 0.12
 SAME_PLACE_M = 0.02
-_UPPER = np.triu_indices(3)
 STRIP_PX = 320_000  # those of 640 x 480, which take some 3 ms
 TWO_PLACES = "two places look like the robot"
 
@@ -62,9 +62,13 @@ class _Found:
     """Two discs taken for the robot's marks."""
 
     discs: Marks
-    centres_m: Centres
+    spots: tuple[Spot, Spot]
     gap_m: float
-    spreads_m2: tuple[Array, Array]
+
+    @property
+    def centres_m(self) -> Centres:
+        """Where the marks are."""
+        return self.spots[0].at_m, self.spots[1].at_m
 
 
 class MarkLocaliser:
@@ -72,6 +76,7 @@ class MarkLocaliser:
 
     def __init__(self, model: CameraModel, marks: MarksConfig) -> None:
         self._model = model
+        self._compiled = compiled(model)
         self._height_m = marks.height_m
         self._radius_m = 0.5 * marks.diameter_m
         self._ground_ratio_max = marks.ground_ratio_max
@@ -224,12 +229,10 @@ class MarkLocaliser:
                 return None, f"{name} mark: {why}"
         if _square(discs):
             return None, "both marks have four corners"
-        at = self._model.floor_point
-        front, rear = (at(disc.u_px, disc.v_px, self._height_m) for disc in discs)
-        gap_m = math.dist(front, rear) - self._distance_m
-        spreads = (self._spread(discs[0]), self._spread(discs[1]))
-        along = np.subtract(front, rear) / max(math.dist(front, rear), 1e-9)
-        doubt_m = 2.0 * math.sqrt(float(along @ (spreads[0] + spreads[1]) @ along))
+        front, rear = (spot(self._compiled, disc, self._height_m) for disc in discs)
+        gap_m = math.dist(front.at_m, rear.at_m) - self._distance_m
+        length_m = max(math.dist(front.at_m, rear.at_m), 1e-9)
+        doubt_m = 2.0 * math.sqrt(gap_variance(front, rear, length_m))
         most_m = DISTANCE_TOLERANCE * self._distance_m
         if not abs(gap_m) <= most_m + min(doubt_m, most_m):
             own_mm = 1e3 * self._distance_m
@@ -237,7 +240,7 @@ class MarkLocaliser:
                 None,
                 f"marks {own_mm + 1e3 * gap_m:.0f} mm apart, the robot's are {own_mm:.0f} mm",
             )
-        found = _Found(discs, (front, rear), gap_m, spreads)
+        found = _Found(discs, (front, rear), gap_m)
         quality = self._quality(found)
         if not quality >= QUALITY_MIN:
             return None, f"rims and distance fit badly together: {quality:.3f}, limit {QUALITY_MIN}"
@@ -273,18 +276,17 @@ class MarkLocaliser:
     def _measurement(self, found: _Found, *, in_window: bool) -> PoseMeasurement:
         """Return pose, quality (1: both rims whole and sharp) and claimed deviations."""
         front, rear = found.discs
-        pose, covariance, misfit2 = weighted_pose(
-            (self._front_m, self._rear_m), found.centres_m, found.spreads_m2
-        )
+        pose, claimed, misfit2 = weighted_pose((self._front_m, self._rear_m), *found.spots)
         # Marks further off their distance than they claim: both claims are too small.
-        covariance *= (MISFIT_FREEDOM + misfit2) / (MISFIT_FREEDOM + 1.0)
+        grown = (MISFIT_FREEDOM + misfit2) / (MISFIT_FREEDOM + 1.0)
+        xx, xy, xt, yy, yt, tt = (grown * value for value in claimed)
         residual_m = 0.5 * abs(found.gap_m)
         return PoseMeasurement(
             pose,
             quality=self._quality(found),
-            sigma_xy_m=math.sqrt(0.5 * (covariance[0, 0] + covariance[1, 1])),
-            sigma_theta_rad=math.sqrt(covariance[2, 2]),
-            covariance=tuple(covariance[_UPPER].tolist()),
+            sigma_xy_m=math.sqrt(0.5 * (xx + yy)),
+            sigma_theta_rad=math.sqrt(tt),
+            covariance=(xx, xy, xt, yy, yt, tt),
             details={
                 "front_u_px": front.u_px,
                 "front_v_px": front.v_px,
@@ -305,13 +307,6 @@ class MarkLocaliser:
         """Return how far a find is from the marks as they are: distance, sizes and rims."""
         rims = sum(abs(d.growth) + d.residual_px / d.radius_px for d in found.discs)
         return rims + abs(found.gap_m) / (DISTANCE_TOLERANCE * self._distance_m)
-
-    def _spread(self, disc: Disc) -> Array:
-        """Return the covariance of a mark's place on its plane, (2, 2), m^2."""
-        uu, uv, vv = disc.covariance_px2
-        slope = self._model.floor_jacobian(disc.u_px, disc.v_px, self._height_m)
-        spread: Array = slope @ np.array([[uu, uv], [uv, vv]]) @ slope.T
-        return spread
 
 
 def _away(find: PoseMeasurement, place_m: Point) -> float:

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "disc_fit.hpp"
+#include "place.hpp"
 #include "search.hpp"
 
 namespace nb = nanobind;
@@ -123,6 +124,40 @@ void bind_rims(nb::module_& m) {
           "image"_a, "centres_m"_a, "windows"_a);
 }
 
+void bind_place(nb::module_& m) {
+  using vision::Placed;
+  using vision::Spot;
+  nb::class_<Spot>(m, "Spot")
+      .def(
+          "__init__",
+          [](Spot* self, const Point& at_m, const std::array<double, 4>& spread_m2) {
+            const auto& [xx, xy, yx, yy] = spread_m2;
+            new (self) Spot{point(at_m), {{{xx, xy}, {yx, yy}}}};
+          },
+          "at_m"_a, "spread_m2"_a)
+      .def_prop_ro("at_m", [](const Spot& s) { return Point(s.at_m.x, s.at_m.y); })
+      .def_prop_ro("spread_m2", [](const Spot& s) {
+        const auto& [top, bottom] = s.spread_m2;
+        return std::array<double, 4>{top[0], top[1], bottom[0], bottom[1]};
+      });
+  m.def(
+      "spot",
+      [](const Camera& camera, const Disc& disc, double height_m) {
+        return vision::spot(camera, {disc.u_px, disc.v_px}, disc.covariance_px2, height_m);
+      },
+      "camera"_a, "disc"_a, "height_m"_a);
+  m.def("gap_variance", &vision::gap_variance, "one"_a, "other"_a, "length_m"_a);
+  m.def(
+      "weighted_pose",
+      [](const std::array<Point, 2>& body_m, const Spot& one, const Spot& other) {
+        const Placed p = vision::weighted_pose({point(body_m[0]), point(body_m[1])}, {one, other});
+        const auto& c = p.covariance;
+        return nb::make_tuple(p.x_m, p.y_m, p.theta_rad,
+                              nb::make_tuple(c[0][0], c[0][1], c[0][2], c[1][1], c[1][2], c[2][2]), p.left);
+      },
+      "body_m"_a, "one"_a, "other"_a);
+}
+
 void bind_search(nb::module_& m) {
   nb::class_<MarkSearch>(m, "MarkSearch")
       .def(
@@ -162,5 +197,6 @@ NB_MODULE(_marks, m) {
              bool fisheye) { new (self) Camera{lens, distortion, rotation, centre_m, fisheye}; },
           "lens"_a, "distortion"_a, "rotation"_a, "centre_m"_a, "fisheye"_a = false);
   bind_rims(m);
+  bind_place(m);
   bind_search(m);
 }

@@ -24,6 +24,21 @@ Camera::Radial Camera::fisheye_radial(double r2) const {
   return {factor, (rise - factor) / (r * r)};
 }
 
+Camera::Radial Camera::bend(double r2) const {
+  const auto& [k1, k2, p1, p2, k3] = distortion;
+  return fisheye
+             ? fisheye_radial(r2)
+             : Radial{1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)), 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))};
+}
+
+std::array<double, 3> Camera::distort_slope(Vec2 at) const {
+  const auto& [k1, k2, p1, p2, k3] = distortion;
+  const auto [radial, slope] = bend(at.x * at.x + at.y * at.y);
+  const double cross = at.x * at.y * slope + 2.0 * p1 * at.x + 2.0 * p2 * at.y;
+  return {radial + at.x * at.x * slope + 2.0 * p1 * at.y + 6.0 * p2 * at.x, cross,
+          radial + at.y * at.y * slope + 6.0 * p1 * at.y + 2.0 * p2 * at.x};
+}
+
 Vec2 Camera::distort(Vec2 at) const {
   const auto& [k1, k2, p1, p2, k3] = distortion;
   const double r2 = at.x * at.x + at.y * at.y;
@@ -48,19 +63,11 @@ Vec2 Camera::project(Vec2 point_m, double z_m) const {
 }
 
 Vec2 Camera::normalise(Vec2 px) const {
-  const auto& [k1, k2, p1, p2, k3] = distortion;
   const Vec2 target = {(px.x - lens[2]) / lens[0], (px.y - lens[3]) / lens[1]};
   Vec2 at = target;
   for (int step = 0; step < kNewtonSteps; ++step) {
     const Vec2 rest = target - distort(at);
-    const double r2 = at.x * at.x + at.y * at.y;
-    const Radial bend =
-        fisheye ? fisheye_radial(r2)
-                : Radial{1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)), 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))};
-    const auto [radial, slope] = bend;
-    const double cross = at.x * at.y * slope + 2.0 * p1 * at.x + 2.0 * p2 * at.y;
-    const double xx = radial + at.x * at.x * slope + 2.0 * p1 * at.y + 6.0 * p2 * at.x;
-    const double yy = radial + at.y * at.y * slope + 6.0 * p1 * at.y + 2.0 * p2 * at.x;
+    const auto [xx, cross, yy] = distort_slope(at);
     const double det = xx * yy - cross * cross;
     const Vec2 move = {(yy * rest.x - cross * rest.y) / det, (xx * rest.y - cross * rest.x) / det};
     at = at + move;
@@ -81,6 +88,39 @@ Vec2 Camera::floor_point(Vec2 px, double height_m) const {
   }
   return {centre_m[0] + reach * (r[0] * at.x + r[1] * at.y + r[2]),
           centre_m[1] + reach * (r[3] * at.x + r[4] * at.y + r[5])};
+}
+
+Vec2 Camera::floor_spot(Vec2 px, double height_m) const {
+  const Vec2 at = normalise(px);
+  const auto& r = rotation;
+  const double dz = r[6] * at.x + r[7] * at.y + r[8];
+  if (!(dz < 0.0)) {
+    return {kNaN, kNaN};
+  }
+  const double drop = height_m - centre_m[2];
+  return {centre_m[0] + drop * ((r[0] * at.x + r[1] * at.y + r[2]) / dz),
+          centre_m[1] + drop * ((r[3] * at.x + r[4] * at.y + r[5]) / dz)};
+}
+
+Dense<2, 2> Camera::floor_slope(Vec2 px, double height_m) const {
+  const Vec2 at = normalise(px);
+  const auto& r = rotation;
+  const double dx = r[0] * at.x + r[1] * at.y + r[2];
+  const double dy = r[3] * at.x + r[4] * at.y + r[5];
+  const double dz = r[6] * at.x + r[7] * at.y + r[8];
+  const double drop = (height_m - centre_m[2]) / (dz * dz);
+  const Dense<2, 2> plane = {{{drop * (r[0] * dz - r[6] * dx), drop * (r[1] * dz - r[7] * dx)},
+                              {drop * (r[3] * dz - r[6] * dy), drop * (r[4] * dz - r[7] * dy)}}};
+  const auto [xx, cross, yy] = distort_slope(at);
+  const double det = xx * yy - cross * cross;
+  Dense<2, 2> slope =
+      product(plane, Dense<2, 2>{{{yy / lens[0], -cross / lens[1]}, {-cross / lens[0], xx / lens[1]}}});
+  for (auto& row : slope) {
+    for (double& value : row) {
+      value /= det;
+    }
+  }
+  return slope;
 }
 
 }  // namespace vision

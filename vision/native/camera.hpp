@@ -4,6 +4,8 @@
 
 #include <array>
 
+#include "fused_matrix.hpp"
+
 namespace vision {
 
 struct Vec2 {
@@ -27,6 +29,9 @@ struct Camera {
   Vec2 project(Vec2 point_m, double z_m) const;
   // Where the ray of a pixel meets the plane z = height.
   Vec2 floor_point(Vec2 px, double height_m) const;
+  // The same, and d(X, Y)/d(u, v) in m/px, in the roundings of vision/camera.py.
+  Vec2 floor_spot(Vec2 px, double height_m) const;
+  Dense<2, 2> floor_slope(Vec2 px, double height_m) const;
 
  private:
   struct Radial {
@@ -34,7 +39,10 @@ struct Camera {
     double slope;  // (d factor / dr) / r
   };
   Radial fisheye_radial(double r2) const;
+  Radial bend(double r2) const;
   Vec2 distort(Vec2 at) const;
+  // d(distorted)/d(undistorted): xx, xy = yx, yy.
+  std::array<double, 3> distort_slope(Vec2 at) const;
   Vec2 normalise(Vec2 px) const;
 };
 

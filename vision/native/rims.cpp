@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "middle.hpp"
+
 namespace vision {
 namespace {
 
@@ -32,17 +34,24 @@ constexpr double kDarkFree = 0.1;
 constexpr double kLeanMax = 0.1;
 constexpr double kLeanNoise = 0.33;  // of a ray's own variance: twice that of a first turn
 
-// Means over neighbouring rays, an odd number of them.
-Round about(const Round& values, int rays) {
+// Means over neighbouring rays, an odd number of them, of two rounds at a time: each sum waits for the one before.
+std::array<Round, 2> about(const Round& one, const Round& other, int rays) {
   const int side = rays / 2;
-  double sum = 0.0;
-  Round means;
-  for (int i = -side; i <= side; ++i) {
-    sum += values[(i + kRays) % kRays];
+  std::array<Two, kRays + 2 * kGainRays> values;  // the first and last ones at both ends
+  for (int i = -side; i <= kRays + side; ++i) {
+    const int ray = (i + kRays) % kRays;
+    values[i + side] = Two{one[ray], other[ray]};
   }
+  Two sum = {0.0, 0.0};
+  for (int i = 0; i < rays; ++i) {
+    sum += values[i];
+  }
+  std::array<Round, 2> means;
   for (int i = 0; i < kRays; ++i) {
-    means[i] = sum / rays;
-    sum += values[(i + side + 1) % kRays] - values[(i - side + kRays) % kRays];
+    const Two mean = sum / static_cast<double>(rays);
+    means[0][i] = mean[0];
+    means[1][i] = mean[1];
+    sum += values[i + rays] - values[i];
   }
   return means;
 }
@@ -80,25 +89,23 @@ std::vector<double> running(const std::vector<float>& response, int samples) {
   return sums;
 }
 
-double median(Round values) {
-  std::nth_element(values.begin(), values.begin() + kRays / 2, values.end());
-  return values[kRays / 2];
-}
-
 // Noise of what each ray has of its own, from rays so far apart that they share no pixels.
 double ray_noise_dn(const Round& values) {
   Round step;
   for (int ray = 0; ray < kRays; ++ray) {
     step[ray] = std::abs(values[ray] - values[(ray + kStepRays) % kRays]);
   }
-  return 1.4826 / std::sqrt(2.0) * median(step);
+  return 1.4826 / std::sqrt(2.0) * middle(step);
 }
 
 // Levels with their first turn round the disc grown by a share `lean`: light that falls to one side does
 // so on from where the levels are taken out to the rim. One that differs by much is a shade or a cover.
 // So does one within the noise of the rays' own levels, `inner`, which would only be added to the rest.
-Round leaning(const Round& inner, double lean, double& grown) {
-  const Round levels = about(inner, kLevelRays);
+Round leaning(const Round& inner, const Round& levels, double lean, double& grown) {
+  grown = 0.0;
+  if (lean == 0.0) {
+    return levels;
+  }
   double mean = 0.0;
   double along = 0.0;
   double across = 0.0;
@@ -110,8 +117,7 @@ Round leaning(const Round& inner, double lean, double& grown) {
   const double square = along * along + across * across;
   const double own_dn = ray_noise_dn(inner);
   const double sure = 1.0 - kLeanNoise * own_dn * own_dn / std::max(square, 1e-12);
-  grown = 0.0;
-  if (lean == 0.0 || sure <= 0.0 || square > kLeanMax * kLeanMax * mean * mean) {
+  if (sure <= 0.0 || square > kLeanMax * kLeanMax * mean * mean) {
     return levels;
   }
   grown = sure * lean;
@@ -124,12 +130,12 @@ Round leaning(const Round& inner, double lean, double& grown) {
 
 // Levels outside, less what their spread round the disc lets them be off that round most of it.
 Round settled(const Round& levels) {
-  const double usual = median(levels);
+  const double usual = middle(levels);
   Round away;
   for (int ray = 0; ray < kRays; ++ray) {
     away[ray] = std::abs(levels[ray] - usual);
   }
-  const double free = kUsualSpreads * 1.4826 * median(away);
+  const double free = kUsualSpreads * 1.4826 * middle(away);
   for (int ray = 0; ray < kRays; ++ray) {
     away[ray] = usual + std::copysign(std::max(away[ray] - free, 0.0), levels[ray] - usual);
   }
@@ -165,14 +171,15 @@ Swing swing(const std::vector<float>& response, const std::vector<double>& sums,
     outer[ray] = (s[out + 1 + level] - s[out + 1]) / level;
     between[ray] = (s[last + 1] - s[first] - 0.5 * (r[first] + r[last])) * (0.5 / edge);
   }
-  const Round low = settled(about(outer, kLevelRays));
+  const auto [levels, grounds] = about(inner, outer, kLevelRays);
+  const Round low = settled(grounds);
   Swing found;
-  const Round high = leaning(inner, lean, found.lean);
+  const Round high = leaning(inner, levels, lean, found.lean);
   found.inner = inner;
   found.outer = outer;
   found.low = low;
   found.high = high;
-  const double usual_dn = usual ? median(low) : 0.0;
+  const double usual_dn = usual ? vision::middle(low) : 0.0;
   for (int ray = 0; ray < kRays; ++ray) {
     const double ground = usual ? usual_dn : low[ray];
     found.rise[ray] = high[ray] - ground;
@@ -240,16 +247,17 @@ Edges Profiles::edges(const std::vector<float>& response) const {
     own.low = here.low;
     own.high = here.high;
     own.lean = here.lean;
-    own.usual_low = median(own.low);
-    own.usual_high = median(own.high);
+    own.usual_low = middle(own.low);
+    own.usual_high = middle(own.high);
     own.strange = strangeness(here.outer, own.low, own.usual_low, level_[k]);
     Round slope;
     for (int ray = 0; ray < kRays; ++ray) {
       slope[ray] = (in.swing[ray] - out.swing[ray]) * (0.5 * e);
       own.shift[ray] = here.swing[ray] * e;
     }
-    own.gain = about(slope, kGainRays);
-    own.level = about(own.rise, kGainRays);
+    const auto [gain, level] = about(slope, own.rise, kGainRays);
+    own.gain = gain;
+    own.level = level;
     for (double& level : own.level) {
       level = std::max(level, 1.0);
     }

@@ -61,7 +61,7 @@ class Fused(_fused.Fused):
         agree with each other (the robot was moved, or slides).
         """
         pose = measurement.pose
-        self.expect(_excess(measurement))
+        self.expect(excess(measurement))
         return pose is not None and self.take_pose(
             t_exposure_s,
             pose.x_m,
@@ -84,7 +84,7 @@ class Fused(_fused.Fused):
         return Estimate(t_host_s, pose, eta1_m_s, theta_dot_rad_s, z1_m, z2_m_s)
 
 
-def _excess(measurement: PoseMeasurement) -> tuple[float, ...]:
+def excess(measurement: PoseMeasurement) -> tuple[float, ...]:
     """Return (xx, xy, xt, yy, yt, tt): the covariance claimed less that of the two sigmas."""
     claimed = measurement.covariance
     if claimed is None or not all(map(math.isfinite, claimed)):

@@ -1,5 +1,5 @@
 // The boundary below which simulated targets differ (hil/core/rig.py), as native code meets it: bytes to and
-// from the board, poses of a camera that gives them itself, a clock. Times are host times in s.
+// from the board, poses of a camera that gives them itself or its pictures, a clock. Times are host times in s.
 #pragma once
 
 #include <cstddef>
@@ -18,6 +18,9 @@ struct PoseFrame {
   double quality = 0.0;
   double sigma_xy_m = 0.001, sigma_theta_rad = 0.005;
   const char* reason = "";
+  // A frame that brings a picture instead: somebody has to find the pose in it. What equal pictures have equal.
+  bool pictured = false;
+  std::string picture;
 };
 
 struct Truth {  // z1 is the flat output with the robot's true d0

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <type_traits>
 #include <vector>
 
 #include "estimate_made.hpp"
@@ -23,6 +24,7 @@ using runs::Command;
 using runs::Motion;
 using runs::Plausibility;
 using runs::Pump;
+using runs::Seen;
 using runs::Watch;
 using runs::WheelLimits;
 using Stops = std::array<bool, runs::kReactionCount>;
@@ -267,7 +269,7 @@ nb::list others_of(Pump& pump) {
 
 // Frames as hil.record.schema.FRAME_NAMES has them, t = 0 at origin_s, one double a value.
 nb::bytes frame_rows(const Pump& pump, double origin_s) {
-  constexpr std::size_t kWidth = 21;  // marks and covariances are not known
+  constexpr std::size_t kWidth = 21;
   std::vector<double> out(pump.frames.size() * kWidth, runs::kNone);
   double* row = out.data();
   for (const Pump::FrameRow& f : pump.frames) {
@@ -283,7 +285,9 @@ nb::bytes frame_rows(const Pump& pump, double origin_s) {
                             f.quality,
                             f.sigma_xy_m,
                             f.sigma_theta_rad};
-    std::copy(std::begin(known), std::end(known), row);
+    double* rest = std::copy(std::begin(known), std::end(known), row);
+    rest = std::copy(f.covariance.begin(), f.covariance.end(), rest);
+    std::copy(f.marks.begin(), f.marks.end(), rest);
     row += kWidth;
   }
   return nb::bytes(reinterpret_cast<const char*>(out.data()), out.size() * sizeof(double));
@@ -295,16 +299,47 @@ core::SimulatedRig& rig_of(const nb::capsule& handle) {
   return *static_cast<core::SimulatedRig*>(handle.data());
 }
 
+// What an eye in Python says (hil/runs/watching.py): pose or None, quality, sigmas, reason; then what is known of the
+// covariance besides the sigmas, the covariance itself, and the marks, each None where it is not.
+Seen seen_of(const nb::tuple& said) {
+  Seen seen;
+  const auto take = [&said](std::size_t place, auto& values) {
+    if (!said[place].is_none()) values = nb::cast<std::decay_t<decltype(values)>>(said[place]);
+  };
+  seen.said.seen = !said[0].is_none();
+  std::array<double, 3> pose{};
+  take(0, pose);
+  seen.said.x_m = pose[0];
+  seen.said.y_m = pose[1];
+  seen.said.theta_rad = pose[2];
+  seen.said.quality = nb::cast<double>(said[1]);
+  seen.said.sigma_xy_m = nb::cast<double>(said[2]);
+  seen.said.sigma_theta_rad = nb::cast<double>(said[3]);
+  seen.reason = nb::cast<std::string>(said[4]);
+  take(5, seen.excess);
+  take(6, seen.covariance);
+  take(7, seen.marks);
+  return seen;
+}
+
+runs::Eye eye_of(const nb::object& eye) {
+  return [eye](const std::optional<estimator::State>& expected) {
+    nb::object pose = nb::none();
+    if (expected) pose = nb::make_tuple(expected->pose.x_m, expected->pose.y_m, expected->pose.theta_rad);
+    return seen_of(nb::cast<nb::tuple>(eye(pose)));
+  };
+}
+
 void bind_pump(nb::module_& m) {
   nb::class_<Pump>(m, "Pump")
       .def(
           "__init__",
           [](Pump* self, const nb::capsule& rig, wire::Link& link, core::CameraClock& camera,
-             estimator::Fused& fused, Watch& watch, const nb::object& note) {
-            new (self) Pump(rig_of(rig), link, camera, fused, watch, note_of(note));
+             estimator::Fused& fused, Watch& watch, const nb::object& note, const nb::object& eye) {
+            new (self) Pump(rig_of(rig), link, camera, fused, watch, note_of(note), eye_of(eye));
           },
           nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(), nb::keep_alive<1, 5>(),
-          nb::keep_alive<1, 6>(), "rig"_a, "link"_a, "camera"_a, "fused"_a, "watch"_a, "note"_a)
+          nb::keep_alive<1, 6>(), "rig"_a, "link"_a, "camera"_a, "fused"_a, "watch"_a, "note"_a, "eye"_a)
       .def(
           "begin",
           [](Pump& p, double until_s, bool busy) { return static_cast<int>(p.begin(until_s, busy)); },

@@ -96,29 +96,35 @@ void Pump::take_frame(const core::PoseFrame& frame) {
     restarts_ = camera_.restarts;
     note_("camera", core::words("its clock has stepped by %+.3f s; tied anew", camera_.step_s));
   }
-  core::PoseFrame said = frame;
-  std::string reason = frame.reason;
+  Seen seen;
   if (!stamped) {
-    said = core::PoseFrame{};
-    reason = odd_stamp(exposure_s - now_s_);
+    seen.reason = odd_stamp(exposure_s - now_s_);
   } else {
     exposure_s = std::min(exposure_s, now_s_);  // jitter aside, no frame is exposed after it came
+    if (frame.pictured) {
+      seen = eye_(fused_.state_at(exposure_s));
+    } else {
+      seen.said = frame;
+      seen.reason = frame.reason;
+    }
     watch_.camera_latency_s = now_s_ - exposure_s;
   }
+  const core::PoseFrame& said = seen.said;
   bool believed = false;
   if (said.seen) {
-    fused_.expect({});
+    fused_.expect(seen.excess);
     believed = fused_.take_pose(exposure_s, {said.x_m, said.y_m, said.theta_rad}, said.sigma_xy_m,
                                 said.sigma_theta_rad);
   }
-  std::string picture;  // the pose of the frame itself: whether its stamp is believed does not matter
-  if (frame.seen) {
+  std::string picture = frame.picture;
+  if (frame.seen) {  // the pose of the frame itself: whether its stamp is believed does not matter
     const double pose[3] = {frame.x_m + 0.0, frame.y_m + 0.0, frame.theta_rad + 0.0};
     picture.assign(reinterpret_cast<const char*>(pose), sizeof(pose));
   }
-  watch_.take_frame(said, exposure_s, reason, picture, believed, fused_.agreement_age_s(exposure_s));
+  watch_.take_frame(said, exposure_s, seen.reason, picture, believed, fused_.agreement_age_s(exposure_s));
   frames.push_back({now_s_, now_s_ - exposure_s, frame.t_cam_s, frame.index, said.seen, said.x_m, said.y_m,
-                    said.theta_rad, said.quality, said.sigma_xy_m, said.sigma_theta_rad});
+                    said.theta_rad, said.quality, said.sigma_xy_m, said.sigma_theta_rad, seen.covariance,
+                    seen.marks});
 }
 
 Agreement Pump::agreement(double now_s) const {

@@ -1,9 +1,10 @@
 // Bytes and frames of a simulated rig taken as they arrive, from arrival to arrival, without a step back into
-// Python: for the default estimator and frames that bring their poses. hil/runs/session.py does the same for
+// Python: for the default estimator, and frames that bring their poses or are looked at by an eye. hil/runs/session.py does the same for
 // any rig and any estimator; what both do with what has come is Watch, Link, the clocks and the estimator.
 #pragma once
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -18,13 +19,33 @@ namespace runs {
 // Why a frame is not looked at whose exposure would lie ahead_s after its arrival.
 std::string odd_stamp(double ahead_s);
 
+// What was seen in one frame: `marks` are where, in px, as a record's last columns have them after `covariance`.
+struct Seen {
+  core::PoseFrame said;
+  std::string reason;
+  estimator::Excess excess{};
+  std::array<double, 6> covariance = none<6>();
+  std::array<double, 4> marks = none<4>();
+
+  template <std::size_t N>
+  static std::array<double, N> none() {
+    std::array<double, N> out;
+    out.fill(kNone);
+    return out;
+  }
+};
+
+// Finds the robot in the picture of the frame taken last; it is expected as it was at the exposure, if that is known.
+using Eye = std::function<Seen(const std::optional<estimator::State>& expected)>;
+
 class Pump {
  public:
   enum Stop { kReached, kHeard, kTaken, kAway };
 
   Pump(core::SimulatedRig& rig, wire::Link& link, core::CameraClock& camera, estimator::Fused& fused,
-       Watch& watch, Note note)
-      : rig_(rig), link_(link), camera_(camera), fused_(fused), watch_(watch), note_(std::move(note)) {}
+       Watch& watch, Note note, Eye eye)
+      : rig_(rig), link_(link), camera_(camera), fused_(fused), watch_(watch), note_(std::move(note)),
+        eye_(std::move(eye)) {}
 
   // Takes what arrives until until_s, and waits once at least. Stops on the way where messages wait in
   // `others`, or after the bytes of an arrival that the procedure under way (`busy`) may look at, or whose
@@ -61,6 +82,8 @@ class Pump {
     std::int64_t index;
     bool seen;
     double x_m, y_m, theta_rad, quality, sigma_xy_m, sigma_theta_rad;
+    std::array<double, 6> covariance;
+    std::array<double, 4> marks;
   };
   std::vector<FrameRow> frames;
 
@@ -78,6 +101,7 @@ class Pump {
   estimator::Fused& fused_;
   Watch& watch_;
   Note note_;
+  Eye eye_;
   Stage stage_ = kLook;
   double until_s_ = 0.0, now_s_ = 0.0, away_until_s_ = 0.0;
   double period_s_ = 0.0, last_s_ = -kInfinite;  // of begin_periods

@@ -24,6 +24,7 @@ import numpy as np
 from hil.analysis.speed import Figure
 from hil.core.errors import RigFault
 from hil.study.campaign import many_rows
+from hil.study.campaign.long_run import LongRun
 from hil.study.campaign.plan import load_campaign
 from hil.study.campaign.speed import thinned
 from hil.study.campaign.work import run_campaign
@@ -43,9 +44,20 @@ class Series:
     y: tuple[float, ...]
 
     @property
+    def line(self) -> tuple[float, float]:
+        """Growth of y a unit of x and y at 0, of the straight line through all by least squares.
+
+        NaN of one point.
+        """
+        if len(self.x) < 2:
+            return float("nan"), float("nan")
+        slope, begin = np.polyfit(self.x, self.y, 1).tolist()
+        return slope, begin
+
+    @property
     def slope(self) -> float:
-        """Growth of y a unit of x, by least squares; NaN of one point."""
-        return float(np.polyfit(self.x, self.y, 1)[0]) if len(self.x) > 1 else float("nan")
+        """Growth of y a unit of x; NaN of one point."""
+        return self.line[0]
 
     def figures(self) -> list[Figure]:
         """Return the points and the slope as the bench prints them."""
@@ -55,8 +67,12 @@ class Series:
         ]
         if len(self.x) < 2:
             return points
-        per = f"{self.unit} per {self.over}"
-        return [*points, Figure.of(f"{self.what}: growth", per, [self.slope], "")]
+        slope, begin = self.line
+        return [
+            *points,
+            Figure.of(f"{self.what}: growth", f"{self.unit} per {self.over}", [slope], ""),
+            Figure.of(f"{self.what}: at 0", self.unit, [begin], ""),
+        ]
 
 
 def measured(longest_s: int, most_rows: int, say: Callable[[str], None]) -> list[Series]:
@@ -74,24 +90,27 @@ def _of_lengths(lengths_s: list[int], say: Callable[[str], None]) -> list[Series
         say(f"run of {length_s} s")
         found.append(recorded_run(length_s))
     x = tuple(float(length_s) for length_s in lengths_s)
-    cpu_s, peak_mb, disk_mb = zip(*found, strict=True)
+    into_s, memory_mb = zip(*found[-1].course, strict=True)
+    what = f"in the course of a run of {lengths_s[-1]} s, memory"
     return [
-        Series("recorded run, processor time", "s of run", "s", x, cpu_s),
-        Series("recorded run, largest memory", "s of run", "MB", x, peak_mb),
-        Series("recorded run, disk", "s of run", "MB", x, disk_mb),
-    ]
+        Series("recorded run, processor time", "s of run", "s", x, tuple(r.cpu_s for r in found)),
+        Series("recorded run, largest memory", "s of run", "MB", x,
+               tuple(r.peak_mb for r in found)),
+        Series("recorded run, disk", "s of run", "MB", x, tuple(r.disk_mb for r in found)),
+        Series(what, "s of run", "MB", into_s, memory_mb),
+    ]  # fmt: skip
 
 
-def recorded_run(length_s: int) -> tuple[float, float, float]:
-    """Return processor time (s), largest memory (MB) and disk (MB) of a recorded run on the circle."""
+def recorded_run(length_s: int) -> LongRun:
+    """Return what a recorded run on the circle took, in a process of its own; raises RigFault."""
     command = [sys.executable, "-m", "hil.study.campaign.long_run", str(length_s)]
     done = subprocess.run(command, check=False, capture_output=True, text=True)
     if done.returncode:
         raise RigFault(
             f"run of {length_s} s: ended with status {done.returncode}: {done.stderr[-300:]}"
         )
-    cpu_s, peak_mb, disk_mb = json.loads(done.stdout)
-    return cpu_s, peak_mb, disk_mb
+    found: dict[str, Any] = json.loads(done.stdout)
+    return LongRun(**found)
 
 
 def _of_rows(rows: list[int], say: Callable[[str], None]) -> list[Series]:
@@ -155,27 +174,48 @@ def _cluster(workers: int) -> Iterator[str]:
         yield cluster.scheduler_address
 
 
+_PANELS = {"s of run": 0, "rows": 1, "runs": 2, "workers": 3, "Dask workers": 3}
+
+
 def write_plot(path: Path, found: list[Series]) -> None:
-    """Draw every series over what it grows with, as SVG, both axes logarithmic."""
+    """Draw every series over what it grows with, as SVG: points, and the straight line fitted to them."""
     import matplotlib as mpl  # noqa: PLC0415 - only to draw
     from matplotlib.backends.backend_svg import FigureCanvasSVG  # noqa: PLC0415
     from matplotlib.figure import Figure as Sheet  # noqa: PLC0415
 
-    axes_of = {"s of run": 0, "rows": 1, "runs": 2, "workers": 2, "Dask workers": 2}
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "growth", "font.size": 8}):
-        sheet = Sheet(figsize=(11, 3.2), layout="constrained")
+        sheet = Sheet(figsize=(11, 7), layout="constrained")
         FigureCanvasSVG(sheet)
-        panels = sheet.subplots(1, 3)
+        panels = sheet.subplots(2, 2).ravel()
         for series in found:
-            axes = panels[axes_of[series.over]]
-            label = f"{series.what}, {series.unit}"
-            if series.over in {"runs", "workers", "Dask workers"}:
-                label += f" over {series.over}"
-            axes.plot(series.x, series.y, "o-", ms=3, label=label)
-        for axes, title in zip(panels, ("s of run", "rows", "runs, workers"), strict=True):
-            axes.set_xscale("log")
-            axes.set_yscale("log")
+            axes = panels[_PANELS[series.over]]
+            colour = f"C{len(axes.collections)}"
+            axes.scatter(series.x, series.y, s=9, color=colour, label=_label(series))
+            if len(series.x) > 1:
+                slope, begin = series.line
+                ends = np.array([0.0, max(series.x)])
+                axes.plot(ends, begin + slope * ends, "-", lw=0.8, color=colour)
+        for axes, title in zip(panels, ("s of run", "rows", "runs", "workers"), strict=True):
+            axes.set_xlim(left=0.0)
+            axes.set_ylim(bottom=0.0)
             axes.set_xlabel(title)
             axes.grid(visible=True, which="major", lw=0.4)
             axes.legend(fontsize=7)
         sheet.savefig(path, format="svg", metadata={"Date": None})
+
+
+def _label(series: Series) -> str:
+    """Return what a legend says: what it is, and its line's constants."""
+    name = f"{series.what}, {series.unit}"
+    if series.over == "Dask workers":
+        name += f" over {series.over}"
+    if len(series.x) < 2:
+        return name
+    slope, begin = series.line
+    sign = "+" if slope >= 0.0 else "-"
+    return f"{name}: {begin:.3g} {sign} {abs(slope):.3g} {_letter(series.over)}"
+
+
+def _letter(over: str) -> str:
+    """Return the letter that a line's formula has for what it grows with."""
+    return {"s of run": "t", "rows": "n", "runs": "n"}.get(over, "w")

@@ -1,7 +1,8 @@
 """Requirements that tell where a task begins, moved along with a start or a point that was moved.
 
-`turn_rad` and `start_offset_x_m` bound what the task's own geometry asks for: turned by half a radian at the
-start a robot has half a radian less to turn, and no law is to blame for that.
+`turn_rad` and `start_offset_x_m` bound what the task's own geometry asks for: turned by half a radian at
+the start a robot has half a radian less to turn, and no law is to blame for that. With its point beside it
+a robot may turn the other way and arrive in reverse: both ways are then within the bounds.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from typing import Any
 from hil.core.types import wrap_pi
 
 Tree = Mapping[str, Any]
+# A point further than this from straight ahead lies beside the robot.
+BESIDE_RAD = 1.2
 
 
 def turn_needed_rad(tree: Tree) -> float:
@@ -50,9 +53,14 @@ def _moved(requirement: dict[str, Any], usual: Tree, changed: Tree) -> dict[str,
         return requirement
     of, within = _MOVED[requirement["metric"]]
     away = within(of(changed) - of(usual))
+    low, high = (away, away)
+    if away and requirement["metric"] == "turn_rad" and changed["reference"]["kind"] == "point":
+        ahead_rad = wrap_pi(turn_needed_rad(changed))
+        if abs(ahead_rad) > BESIDE_RAD:  # half a turn less to the right is one to the left
+            low, high = (low - math.pi, high) if ahead_rad > 0.0 else (low, high + math.pi)
     bounds = {
-        side: round(requirement[side] + away, 4)
-        for side in ("min", "max")
-        if away and requirement.get(side) is not None
+        side: round(requirement[side] + by, 4)
+        for side, by in (("min", low), ("max", high))
+        if by and requirement.get(side) is not None
     }
     return requirement | bounds
