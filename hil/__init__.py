@@ -12,7 +12,9 @@ __version__ = "0.1.0"
 
 # name -> (module, name there)
 _NAMES = {
+    "CommandBatch": ("hil.core.batch", "CommandBatch"),
     "Estimate": ("hil.core.types", "Estimate"),
+    "EstimateBatch": ("hil.core.batch", "EstimateBatch"),
     "Estimator": ("hil.core.types", "Estimator"),
     "Localiser": ("vision.tracker", "Localiser"),
     "OuterCommand": ("hil.core.types", "OuterCommand"),
@@ -20,6 +22,7 @@ _NAMES = {
     "Pose": ("hil.core.types", "Pose"),
     "PoseMeasurement": ("hil.core.types", "PoseMeasurement"),
     "Reference": ("hil.control.references", "Reference"),
+    "ReferenceBatch": ("hil.core.batch", "ReferenceBatch"),
     "ReferenceState": ("hil.core.types", "ReferenceState"),
     "WheelSample": ("hil.core.types", "WheelSample"),
     "BadInput": ("hil.core.errors", "BadInput"),
@@ -70,9 +73,11 @@ __all__ = [
     "BadInput",
     "BelievedGeometry",
     "CameraConfig",
+    "CommandBatch",
     "Comparison",
     "Contacts",
     "Estimate",
+    "EstimateBatch",
     "Estimator",
     "EstimatorConfig",
     "Experiment",
@@ -83,6 +88,7 @@ __all__ = [
     "Pose",
     "PoseMeasurement",
     "Reference",
+    "ReferenceBatch",
     "ReferenceConfig",
     "ReferenceState",
     "RigFault",
@@ -143,6 +149,9 @@ if TYPE_CHECKING:
     from hil.control.references import Reference as Reference
     from hil.control.vehicles.vehicle import Contacts as Contacts
     from hil.control.vehicles.vehicle import TwoSided as TwoSided
+    from hil.core.batch import CommandBatch as CommandBatch
+    from hil.core.batch import EstimateBatch as EstimateBatch
+    from hil.core.batch import ReferenceBatch as ReferenceBatch
     from hil.core.errors import BadInput as BadInput
     from hil.core.errors import RigFault as RigFault
     from hil.core.figures import figure as figure

@@ -8,17 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
+
+# So many runs side by side feed the lanes of one core (docs/performance.md).
+SIDE_BY_SIDE = 32
 
 Array = NDArray[np.float64]
 Pairs = tuple[Array, Array]
 
 
-@dataclass(frozen=True, slots=True)
-class PoseBatch:
+class PoseBatch(NamedTuple):
     """Poses of the centres of mass: world X, Y in m, heading in rad."""
 
     x_m: Array
@@ -26,8 +28,7 @@ class PoseBatch:
     theta_rad: Array
 
 
-@dataclass(frozen=True, slots=True)
-class EstimateBatch:
+class EstimateBatch(NamedTuple):
     """States of the robots, as `hil.core.types.Estimate` has one; `driven_hard` is of bool."""
 
     t_host_s: Array
@@ -40,8 +41,7 @@ class EstimateBatch:
     driven_hard: NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True)
-class ReferenceBatch:
+class ReferenceBatch(NamedTuple):
     """Desired flat outputs and their first three time derivatives, world axes."""
 
     z1_m: Pairs
@@ -94,21 +94,11 @@ ROWS = 22
 
 def asked(rows: Array) -> tuple[ReferenceBatch, EstimateBatch, Array]:
     """Return reference, estimate and step of several runs from an array of ROWS rows, a column a run."""
-    sides = (rows[10], rows[11])
-    estimate = EstimateBatch(
-        rows[0],
-        PoseBatch(rows[1], rows[2], rows[3]),
-        rows[4],
-        rows[5],
-        (rows[6], rows[7]),
-        (rows[8], rows[9]),
-        sides,
-        rows[12] != 0.0,
-    )
-    reference = ReferenceBatch(
-        (rows[13], rows[14]), (rows[15], rows[16]), (rows[17], rows[18]), (rows[19], rows[20])
-    )
-    return reference, estimate, rows[21]
+    t, x, y, theta, eta1, turn, *rest, dt_s = rows
+    z1, z2, sides = (rest[0], rest[1]), (rest[2], rest[3]), (rest[4], rest[5])
+    pose, hard = PoseBatch(x, y, theta), rest[6] != 0.0
+    reference = ReferenceBatch(*zip(rest[7::2], rest[8::2], strict=True))
+    return reference, EstimateBatch(t, pose, eta1, turn, z1, z2, sides, hard), dt_s
 
 
 def column_of(reference: Any, estimate: Any, dt_s: float) -> list[float]:

@@ -199,11 +199,13 @@ class Drive:
 class AnsweredLaw(OuterLaw):
     """A law that native code asks and others answer; see native/answered_law.hpp."""
 
-    is_reset: bool
     def __init__(self) -> None: ...
 
 def questions(laws: Sequence[AnsweredLaw]) -> bytes:
-    """Return what laws are asked: rows of doubles in the order of hil.core.batch.asked, a column a law."""
+    """Return what laws are asked: rows of doubles as hil.core.batch.asked has them, a column a law.
+
+    One more row is 1 for those that are to start anew.
+    """
 
 def answer(laws: Sequence[AnsweredLaw], answers: bytes, places: Sequence[int]) -> None:
     """Answer: forward speeds, turn rates, then what goes to the places of the traces; a column a law."""

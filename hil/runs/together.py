@@ -202,15 +202,16 @@ class _Batch:
         """Answer for the runs at `places`, whose laws are asked; return what ends which of them."""
         where = np.array([self._at[place] for place in places], np.intp)
         laws = [self._asked[at].native for at in where.tolist()]
-        rows = np.frombuffer(_native.questions(laws)).reshape(ROWS, len(laws))
-        reset = np.array([law.is_reset for law in laws], np.bool_)
+        rows = np.frombuffer(_native.questions(laws)).reshape(ROWS + 1, len(laws))
+        reset = rows[ROWS] != 0.0
         try:
             if self._batch is None:
                 self._batch = GuardedBatch([one.law for one in self._asked])
-            given, names, faults = self._batch.step(where, rows, reset)
+            given, names, faults = self._batch.step(where, rows[:ROWS], reset)
         except RigFault as fault:
             return {place: RigFault(str(fault)) for place in places}
-        keep = [2 + row for row, name in enumerate(names) if name in self._places]
         kept = [self._places[name] for name in names if name in self._places]
-        _native.answer(laws, given[[0, 1, *keep]].tobytes(), kept)
+        if len(kept) < len(names):
+            given = given[[0, 1, *(2 + i for i, name in enumerate(names) if name in self._places)]]
+        _native.answer(laws, given.tobytes(), kept)
         return {places[column]: fault for column, fault in faults.items()}

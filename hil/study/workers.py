@@ -15,13 +15,12 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.process import BaseProcess
 from typing import Any, Generic, TypeVar
 
+from hil.core.batch import SIDE_BY_SIDE
 from hil.runs.interruption import CtrlC
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
-# So many jobs of a function that does several side by side go to a worker at once (docs/performance.md).
-SIDE_BY_SIDE = 16
 # A worker gets so many groups at least, or there would be none for one that is done early.
 _GROUPS_A_WORKER = 3
 

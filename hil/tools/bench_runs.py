@@ -8,6 +8,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from random import Random
@@ -17,9 +18,11 @@ from hil.analysis.speed import Figure, Plan, measure
 from hil.config.link import UART_BAUD
 from hil.config.load import load_scenario
 from hil.control.laws.making import make_law
+from hil.core.batch import SIDE_BY_SIDE
 from hil.core.registries import OUTER_LAWS
 from hil.rigs.opening import open_rig
-from hil.runs.execute import RunSpec, execute_in_memory
+from hil.runs.execute import InMemory, RunSpec, execute_in_memory
+from hil.runs.together import run_together
 from hil.tools.bench_plants import plant_figures
 from sim_twin.setup import STEP_US, make_kernel
 
@@ -35,8 +38,9 @@ _DRIVING = (0.5, 0.3)  # duties of the plant alone
 
 
 # Ways in which a run may advance (hil/runs/driving.py, hil/runs/intake.py): all of it in native code, a
-# law in Python that native code asks each tick, all ticks and arrivals in Python.
-NATIVE, ASKED, PYTHON = range(3)
+# law in Python that native code asks each tick, all ticks and arrivals in Python; or several side by side
+# (hil/runs/together.py), all of them in native code.
+NATIVE, ASKED, PYTHON, TOGETHER = range(4)
 
 
 def batch_figures(runs: int) -> list[Figure]:
@@ -46,9 +50,11 @@ def batch_figures(runs: int) -> list[Figure]:
     large = load_scenario("scenario-1", [*_LARGE, "duration_s=20"])
     plans: list[Plan] = []
     for what, scenario, camera, way in (
+        (f"{SIDE_BY_SIDE} side by side, 10 s to a point", standing, "pose", TOGETHER),
         ("pose camera, 10 s to a point", standing, "pose", NATIVE),
         ("the same, its law in Python", standing, "pose", ASKED),
         ("the same, taken in by Python", standing, "pose", PYTHON),
+        (f"{SIDE_BY_SIDE} side by side, 10 s on a circle", driving, "pose", TOGETHER),
         ("pose camera, 10 s on a circle", driving, "pose", NATIVE),
         ("the circle, its law in Python", driving, "pose", ASKED),
         ("the circle, taken in by Python", driving, "pose", PYTHON),
@@ -79,8 +85,14 @@ def law_figures(runs: int) -> list[Figure]:
         file.write_text(text.replace("my-thing", "bench-law"), encoding="utf-8")
         own = OUTER_LAWS.get(str(file)).name
         plans: list[Plan] = [
-            (f"whole loop with {what}", _X, "", _times_real_time(scenario, "pose", law))
-            for what, law in (("an own law in Python", own), ("asg-ism", "asg-ism"), ("pid", "pid"))
+            (f"whole loop with {what}", _X, "", _times_real_time(scenario, "pose", law, way))
+            for what, law, way in (
+                ("an own law in Python", own, NATIVE),
+                (f"an own law that steps {SIDE_BY_SIDE} runs at once", own, TOGETHER),
+                ("asg-ism", "asg-ism", NATIVE),
+                (f"asg-ism, {SIDE_BY_SIDE} side by side", "asg-ism", TOGETHER),
+                ("pid", "pid", NATIVE),
+            )
         ]
         return [measure(name, unit, goal, runs, once) for name, unit, goal, once in plans]
 
@@ -106,17 +118,27 @@ class _OwnLaw:
         self.step = law.step
 
 
-def _simulated(scenario: Scenario, camera: str, outer: str, way: int) -> float:
-    """Make one run in memory, as a campaign does, and return the time that passed on its rig, s."""
-    spec = RunSpec(scenario, "twin", camera, outer, "asg-ism", 1, Path(), rerun=False)
-    rig = open_rig("twin", scenario, camera, spec.seed)
-    law = None if way == NATIVE else _OwnLaw(make_law(outer, scenario))
+def _simulated(scenario: Scenario, camera: str, outer: str, way: int) -> tuple[float, int]:
+    """Make runs in memory, as a campaign does: the time that passed on their rigs in s, and how many."""
+    count = SIDE_BY_SIDE if way == TOGETHER else 1
+    specs = [
+        RunSpec(scenario, "twin", camera, outer, "asg-ism", seed + 1, Path(), rerun=False)
+        for seed in range(count)
+    ]
+    rigs = [open_rig("twin", scenario, camera, spec.seed) for spec in specs]
     if way == PYTHON:
-        rig = cast("Rig", _ByPython(rig))
-    begin_s = rig.now_s()
-    record = execute_in_memory(spec, rig, law)
-    record.verdicts()
-    return rig.now_s() - begin_s
+        rigs = [cast("Rig", _ByPython(rig)) for rig in rigs]
+    begin_s = sum(rig.now_s() for rig in rigs)
+    law = _OwnLaw(make_law(outer, scenario)) if way in {ASKED, PYTHON} else None
+    makers = [partial(InMemory, spec, rig, law) for spec, rig in zip(specs, rigs, strict=True)]
+    records = (
+        run_together(makers) if way == TOGETHER else [execute_in_memory(specs[0], rigs[0], law)]
+    )
+    for record in records:
+        if isinstance(record, BaseException):
+            raise record
+        record.verdicts()
+    return sum(rig.now_s() for rig in rigs) - begin_s, count
 
 
 def _times_real_time(
@@ -124,7 +146,7 @@ def _times_real_time(
 ) -> Callable[[], float]:
     def once() -> float:
         start_s = time.process_time()
-        simulated_s = _simulated(scenario, camera, outer, way)
+        simulated_s, _ = _simulated(scenario, camera, outer, way)
         return simulated_s / (time.process_time() - start_s)
 
     return once
@@ -133,8 +155,8 @@ def _times_real_time(
 def _runs_a_second(scenario: Scenario, camera: str, outer: str, way: int) -> Callable[[], float]:
     def once() -> float:
         start_s = time.process_time()
-        _simulated(scenario, camera, outer, way)
-        return 1.0 / (time.process_time() - start_s)
+        _, count = _simulated(scenario, camera, outer, way)
+        return count / (time.process_time() - start_s)
 
     return once
 

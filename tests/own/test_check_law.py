@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from hil.core.errors import BadInput
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import BUILT_IN
 from hil.tools.conformance import law_report
+from hil.tools.conformance.batches import CHECK
 from hil.tools.conformance.laws import ON_THE_FLOOR, ON_THE_TWIN
 from tests.cli.command import hil as command
 from tests.own.starts import law_text, written
@@ -90,9 +92,42 @@ def test_a_generator_without_a_seed_is_heard_and_makes_instances_differ(tmp_path
     assert "deterministic" not in report.failures
 
 
+# What step_batch has, and what makes it another law, or one that minds its company.
+MANY = "        return hil.CommandBatch(forward_m_s, turn, {"
+MISFITS = {
+    "another sign": (MANY, "        turn = -turn\n" + MANY, "step_batch returned"),
+    "the mean of all": (MANY, "        turn = turn + 1e-12 * turn.mean()\n" + MANY, "in another order|alone"),
+    "a gain of its own": ("[one.speed_s for", "[1.0 + 1e-6 for", "step_batch returned"),
+    "a place too many": ("self._forward_m_s[where] = estimate.eta1_m_s",
+                         "self._forward_m_s[:] = 0.1", "again after a reset|alone|order"),
+}  # fmt: skip
+
+
+def test_a_law_that_steps_many_at_once_is_held_to_its_step(tmp_path: Path):
+    """The template's agrees to rounding, and the report says how well."""
+    report = hil.check_law(written(tmp_path / "many.py", law_text("many")))
+    (finding,) = [finding for finding in report.findings if finding.name == CHECK]
+    assert finding.holds
+    assert finding.said.startswith("as step to ")
+
+
+@pytest.mark.parametrize("misfit", MISFITS)
+def test_a_law_that_steps_many_otherwise_is_told(misfit, tmp_path: Path):
+    """One that gives other commands than `step`, or whose runs see each other (negative control)."""
+    good, bad, said = MISFITS[misfit]
+    text = law_text(f"misfit-{misfit.replace(' ', '-')}")
+    assert good in text
+    report = law_report(written(tmp_path / "m.py", text.replace(good, bad)), overrides=SHORT)
+    (finding,) = [finding for finding in report.findings if finding.name == CHECK]
+    assert not finding.holds
+    assert re.search(said, finding.said)
+    assert [name for name in report.failures if name in ON_THE_FLOOR] == []
+
+
 def test_a_law_that_does_nothing_does_not_pass(tmp_path: Path):
     """A law at rest is finite and deterministic, and holds no scenario."""
     text = law_text("lazy").replace(RETURN, "        return hil.OuterCommand(0.0, 0.0, {")
+    text = text.replace("    def batch(", "    def no_batch(")
     report = law_report(written(tmp_path / "lazy.py", text), overrides=("duration_s=3",))
     assert report.failures == ("scenario holds", "negative control")
 

@@ -29,9 +29,9 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench_plants, "_PORT_STEPS", 1)
     monkeypatch.setattr(bench_plants, "_installed", lambda package: package == "mujoco")
 
-    def worked(*_run: object) -> float:
+    def worked(*_run: object) -> tuple[float, int]:
         assert sum(range(50_000)) > 0  # takes a while
-        return 11.0
+        return 11.0, 1
 
     monkeypatch.setattr(bench_runs, "_simulated", worked)
 
@@ -49,9 +49,9 @@ def test_batch_says_runs_and_times_real_time_of_each_path() -> None:
     assert done.json["machine"]["cores"] >= 1
     found = {(item["name"], item["unit"]): item for item in done.json["figures"]}
     registers = {2, 4, _native.widest_register()}
-    # Three ways of the pose camera, two tasks; rendered in two sizes; plant and kernel; peers; limits.
+    # Four ways of the pose camera, two tasks; rendered in two sizes; plant and kernel; peers; limits.
     plants = 2 + len(_native.lane_widths()) + 2 + 3 * len(registers)
-    assert len(found) == 21 + plants
+    assert len(found) == 25 + plants
     assert ("MuJoCo, four wheels, one step of 0.0005 s", "ns") in found
     assert ("the same in numba", "ns") not in found  # what is not installed is left out
     assert ("the same, taken in by Python", "x real time") in found
@@ -69,8 +69,11 @@ def test_the_simulated_time_of_a_run_is_that_of_its_rig() -> None:
     scenario = bench_runs.load_scenario("scenario-1", ["duration_s=1"])
     ways = (bench_runs.NATIVE, bench_runs.ASKED, bench_runs.PYTHON)
     one, *others = (bench_runs._simulated(scenario, "pose", "pid", way) for way in ways)
-    assert 1.0 < one < 3.0
+    assert 1.0 < one[0] < 3.0
     assert others == [one, one]
+    both = bench_runs._simulated(scenario, "pose", "pid", bench_runs.TOGETHER)
+    assert both[0] == pytest.approx(bench_runs.SIDE_BY_SIDE * one[0], rel=0.05)
+    assert both[1] == bench_runs.SIDE_BY_SIDE
 
 
 def test_the_campaign_is_the_built_in_one_with_fewer_runs() -> None:

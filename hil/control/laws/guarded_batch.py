@@ -33,9 +33,8 @@ class GuardedBatch:
         self._laws = laws
         first = laws[0]
         self._batch: OuterLawBatch = first.call("batch", lambda: first.batch_of(laws))
-        self._limits = np.array(
-            [(law.limits.eta1_max_m_s, law.limits.theta_dot_max_rad_s) for law in laws]
-        ).T
+        limits = [(law.limits.eta1_max_m_s, law.limits.theta_dot_max_rad_s) for law in laws]
+        self._most = np.array(limits).T * EXCESS
 
     def step(
         self, where: NDArray[np.intp], rows: Array, reset: NDArray[np.bool_]
@@ -83,7 +82,7 @@ class GuardedBatch:
             ) from None
 
     def _faults(self, where: NDArray[np.intp], given: Array) -> dict[int, RigFault]:
-        within = np.abs(given[:2]) <= self._limits[:, where] * EXCESS  # False for NaN
+        within = np.abs(given[:2]) <= self._most[:, where]  # False for NaN
         if within.all():
             return {}
         faults: dict[int, RigFault] = {}

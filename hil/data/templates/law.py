@@ -9,6 +9,9 @@ World frame: X right and Y up on the floor; theta counter-clockwise from +X; SI 
 """
 
 import math
+from collections.abc import Sequence
+
+import numpy as np
 
 import hil
 
@@ -57,3 +60,56 @@ class MyThing:
         turn = gains.turn_rad_s * abeam / (math.hypot(wish_x, wish_y) + 0.02)
         turn = min(max(turn, -limits.theta_dot_max_rad_s), limits.theta_dot_max_rad_s)
         return hil.OuterCommand(self._forward_m_s, turn, {"abeam_m_s": abeam})
+
+    @classmethod
+    def batch(cls, laws: Sequence["MyThing"]) -> "MyThings":
+        """Return what steps many runs at once; leave it out, and campaigns ask `step` run by run."""
+        return MyThings(laws)
+
+
+class MyThings:
+    """The same law for many runs side by side: arrays with one number a run, each its own gains."""
+
+    def __init__(self, laws: Sequence[MyThing]) -> None:
+        gains, limits = [law._gains for law in laws], [law._limits for law in laws]
+        self._speed_s = np.array([one.speed_s for one in gains])
+        self._turn_rad_s = np.array([one.turn_rad_s for one in gains])
+        fastest = [min(one.eta1_max_m_s, one.approach_speed_m_s or math.inf) for one in limits]
+        self._most_m_s = np.array(fastest)
+        self._zeta_m_s2 = np.array([one.zeta_max_m_s2 for one in limits])
+        self._turn_most_rad_s = np.array([one.theta_dot_max_rad_s for one in limits])
+        self._forward_m_s = np.zeros(len(laws))
+
+    def reset_batch(
+        self,
+        where: np.ndarray,
+        reference: hil.ReferenceBatch,  # noqa: ARG002
+        estimate: hil.EstimateBatch,
+    ) -> None:
+        """Start those at the places `where` anew."""
+        self._forward_m_s[where] = estimate.eta1_m_s
+
+    def step_batch(
+        self,
+        where: np.ndarray,
+        reference: hil.ReferenceBatch,
+        estimate: hil.EstimateBatch,
+        dt_s: np.ndarray,
+    ) -> hil.CommandBatch:
+        """Return the commands of those at `where`, whose tick it is; the arrays have their order."""
+        (x_m, y_m), (x_ref_m, y_ref_m) = estimate.z1_m, reference.z1_m
+        speed_s, most_m_s = self._speed_s[where], self._most_m_s[where]
+        wish_x = reference.z1_dot_m_s[0] + speed_s * (x_ref_m - x_m)
+        wish_y = reference.z1_dot_m_s[1] + speed_s * (y_ref_m - y_m)
+        cos, sin = np.cos(estimate.pose.theta_rad), np.sin(estimate.pose.theta_rad)
+        ahead, abeam = cos * wish_x + sin * wish_y, cos * wish_y - sin * wish_x
+        ahead = np.minimum(np.maximum(ahead, -most_m_s), most_m_s)
+        change = self._zeta_m_s2[where] * dt_s
+        forward_m_s = self._forward_m_s[where]
+        forward_m_s = forward_m_s + np.minimum(np.maximum(ahead - forward_m_s, -change), change)
+        forward_m_s = np.minimum(np.maximum(forward_m_s, -most_m_s), most_m_s)
+        self._forward_m_s[where] = forward_m_s
+        turn = self._turn_rad_s[where] * abeam / (np.hypot(wish_x, wish_y) + 0.02)
+        turn_most = self._turn_most_rad_s[where]
+        turn = np.minimum(np.maximum(turn, -turn_most), turn_most)
+        return hil.CommandBatch(forward_m_s, turn, {"abeam_m_s": abeam})

@@ -26,16 +26,26 @@ const std::vector<std::pair<std::size_t, int>>& Together::run() {
       if (members_[place].state == kReady) part(place);
       if (members_[place].state == kMoving) moving_.push_back(place);
     }
-    if (!stops_.empty()) return stops_;
+    if (!stops_.empty() || are_waiting()) return stops_;
     if (moving_.empty()) break;
     move();
     if (!stops_.empty()) return stops_;
   }
-  if (!moving_.empty()) return stops_;
-  for (std::size_t place = 0; place < members_.size(); ++place) {
-    if (members_[place].state == kAsking) waiting_.push_back(place);
-  }
   return stops_;
+}
+
+// Whether so many wait for their laws' answers that it is time: where all others waited for the last, few rigs
+// would be left to be moved together.
+bool Together::are_waiting() {
+  std::size_t asking = 0;
+  for (std::size_t place = 0; place < members_.size(); ++place) {
+    const Member& member = members_[place];
+    if (member.state != kOut && member.asks) ++asking;
+    if (member.state == kAsking) waiting_.push_back(place);
+  }
+  if (waiting_.empty() || moving_.empty() || kShare * waiting_.size() >= asking) return !waiting_.empty();
+  waiting_.clear();
+  return false;
 }
 
 // Lets a run go on up to what it cannot do by itself.
@@ -45,6 +55,7 @@ void Together::part(std::size_t place) {
     int stop = Drive::kPaused;
     while (stop == Drive::kPaused) stop = member.drive->part(member.busy, member.refused, member.board);
     member.state = stop == Drive::kAway ? kMoving : stop == Drive::kLaw ? kAsking : kOut;
+    if (member.state == kAsking) member.asks = true;
     if (member.state == kOut) stops_.emplace_back(place, stop);
   } catch (...) {
     fail(place, std::current_exception());

@@ -33,18 +33,20 @@ class Together {
   [[noreturn]] void rethrow(std::size_t place);
 
  private:
-  static constexpr int kPause = 1024;  // rounds after which Python may see to signals and threads
+  static constexpr int kPause = 1024;       // rounds after which Python may see to signals and threads
+  static constexpr std::size_t kShare = 2;  // of those whose laws others answer one in so many waits
 
   enum State { kReady, kMoving, kAsking, kOut };
   struct Member {
     Drive* drive;
     State state = kOut;
-    bool busy = false, refused = false;
+    bool busy = false, refused = false, asks = false;
     BoardLimits board{};
     std::exception_ptr failed;
   };
 
   void part(std::size_t place);
+  bool are_waiting();
   void fail(std::size_t place, std::exception_ptr failed);
   void move();
 

@@ -21,7 +21,7 @@ using outer::AnsweredLaw;
 using runs::Together;
 using Laws = std::vector<AnsweredLaw*>;
 
-// In the order of QUESTION: a row of `laws` doubles each.
+// In the order of hil.core.batch.asked, and whether it is to start anew.
 template <typename Put>
 void question(const AnsweredLaw::Question& q, Put put) {
   const outer::Estimate& e = q.estimate;
@@ -38,9 +38,10 @@ void question(const AnsweredLaw::Question& q, Put put) {
   put(e.driven_hard ? 1.0 : 0.0);
   for (const outer::Vec2* v : {&r.z1_m, &r.z1_dot_m_s, &r.z1_ddot_m_s2, &r.z1_dddot_m_s3}) both(*v);
   put(q.dt_s);
+  put(q.reset ? 1.0 : 0.0);
 }
 
-constexpr std::size_t kQuestion = 22;
+constexpr std::size_t kQuestion = 23;
 
 nb::bytes questions(const Laws& laws) {
   std::vector<double> out(kQuestion * laws.size());
@@ -72,9 +73,7 @@ void answer(const Laws& laws, const nb::bytes& answers, const std::vector<std::s
 }  // namespace
 
 void bind_together(nb::module_& m) {
-  nb::class_<AnsweredLaw, outer::OuterLaw>(m, "AnsweredLaw")
-      .def(nb::init<>())
-      .def_prop_ro("is_reset", [](const AnsweredLaw& law) { return law.question().reset; });
+  nb::class_<AnsweredLaw, outer::OuterLaw>(m, "AnsweredLaw").def(nb::init<>());
   m.def("questions", &questions, "laws"_a);
   m.def("answer", &answer, "laws"_a, "answers"_a, "places"_a);
   nb::class_<Together>(m, "Together")

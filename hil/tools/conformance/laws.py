@@ -26,6 +26,7 @@ from hil.record.reader import RunRecord
 from hil.record.schema import LAW_COLUMNS
 from hil.runs.execute import RunSpec, execute_in_memory
 from hil.runs.provenance import trace_terms
+from hil.tools.conformance import batches
 from hil.tools.conformance.floor import Episode, episodes, mirrored
 from hil.tools.conformance.report import Checks, Named, Report, Violation, entry_of
 from hil.tools.conformance.watch import Heard, require_no_clock, require_no_random, watch
@@ -106,6 +107,8 @@ def _on_the_floor(checks: Checks, bench: Bench) -> None:
     )  # fmt: skip
     for name, check in zip(ON_THE_FLOOR, made, strict=True):
         checks.run(name, partial(check, bench))
+    if batches.makes_batches(bench.make()):
+        checks.run(batches.CHECK, partial(_batch, bench))
 
 
 def _on_the_twin(checks: Checks, bench: Bench) -> None:
@@ -267,6 +270,12 @@ def _shared(bench: Bench) -> str:
     for one, two, episode in zip(alone, turns, (first, second), strict=True):
         _require_same(one[: len(two)], two, episode, "alone, and in turns with another instance")
     return "two instances in turns are as each alone"
+
+
+def _batch(bench: Bench) -> str:
+    alone = [commands(bench.make(), episode, bench.dt_s) for episode in bench.episodes]
+    limits = bench.scenario.control.limits
+    return batches.agreement(bench.make, bench.episodes, alone, limits, bench.dt_s)
 
 
 def _no_clock(bench: Bench, heard: Heard) -> str:
