@@ -313,6 +313,7 @@ class View:
     cx: float
     cy: float
     dist: Sequence[float]
+    below: Sequence[float]
     fisheye: bool
     R: Sequence[float]
     t: Sequence[float]

@@ -27,6 +27,7 @@ from hil.config.camera import (
 )
 from hil.core.errors import BadInput
 from sim_twin import _native
+from vision.camera import TERMS
 from vision.camera_setup import camera_model
 
 if TYPE_CHECKING:
@@ -183,7 +184,8 @@ def _view(camera: CameraConfig) -> _native.View:
     view = _native.View()
     view.width, view.height = model.width_px, model.height_px
     view.fx, view.fy, view.cx, view.cy = model.fx_px, model.fy_px, model.cx_px, model.cy_px
-    view.dist = list(model.dist)
+    view.dist = list(model.dist[:TERMS])
+    view.below = list(model.dist[TERMS:] or (0.0, 0.0, 0.0))
     view.fisheye = model.fisheye
     view.R = model.R_world_cam.ravel().tolist()
     view.t = model.t_world_cam_m.tolist()

@@ -122,9 +122,9 @@ def _truth(camera: CameraConfig) -> str:
     """Return lens, pose and marks as a camera file."""
     model = camera_model(camera)
     rotation = ", ".join(f"[{', '.join(f'{x:.9f}' for x in row)}]" for row in model.R_world_cam)
-    names = ("fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3")
+    names = ("fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
     values = (model.fx_px, model.fy_px, model.cx_px, model.cy_px, *model.dist)
-    lens = "\n".join(f"{name} = {value!r}" for name, value in zip(names, values, strict=True))
+    lens = "\n".join(f"{name} = {value!r}" for name, value in zip(names, values, strict=False))
     eye = ", ".join(f"{x!r}" for x in map(float, model.t_world_cam_m))
     return (
         f"width_px = {model.width_px}\nheight_px = {model.height_px}\n\n"

@@ -14,7 +14,10 @@ Place = Sequence[float]
 """A place of one mark: x_m, y_m on the marks' plane, and what it loses in score."""
 
 class Camera:
-    """What vision.camera.CameraModel says: fx, fy, cx, cy; k1, k2, p1, p2, k3; R_world_cam row by row."""
+    """What vision.camera.CameraModel says: fx, fy, cx, cy; k1, k2, p1, p2, k3; R_world_cam row by row.
+
+    `below` is k4, k5, k6 of a rational lens, zeros for another.
+    """
 
     def __init__(
         self,
@@ -23,6 +26,7 @@ class Camera:
         rotation: Sequence[float],
         centre_m: Sequence[float],
         fisheye: bool = False,
+        below: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> None: ...
 
 class Disc:

@@ -3,8 +3,9 @@
 Frames: world is right-handed, X right and Y up on the floor, z up, metres. Camera is OpenCV's: x
 to the right of the image, y down, z along the optical axis. The pose, `R_world_cam` and
 `t_world_cam_m`, takes camera coordinates to world coordinates, so the latter is the camera's
-centre. Pixel (0, 0) is the centre of the first pixel. Distortion is OpenCV's five-term model (k1,
-k2, p1, p2, k3).
+centre. Pixel (0, 0) is the centre of the first pixel. Distortion is OpenCV's model of five terms (k1,
+k2, p1, p2, k3), or of eight: the radial factor of its rational model is
+(1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6).
 
 The maths is written out here and not taken from cv2: `cv2.undistortPoints` stops 0.1 px short of
 the answer at image corners with its default criteria, and a call for one point costs more than
@@ -26,8 +27,10 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 Scalars = TypeVar("Scalars", float, Array)
-Distortion = tuple[float, float, float, float, float]
+Distortion = tuple[float, ...]  # k1, k2, p1, p2, k3, and for a rational lens k4, k5, k6
 
+TERMS = 5
+RATIONAL_TERMS = 8
 NEWTON_STEPS_MAX = 20
 NEWTON_TOLERANCE = 1e-13
 # Below this squared radius a fisheye's factor is that at it: 1 to 1e-10.
@@ -36,7 +39,7 @@ R2_SMALL = 1e-10
 
 def _fisheye_radial(r2: Scalars, dist: Distortion) -> tuple[Scalars, Scalars]:
     """Return the radial factor of a fisheye lens and its slope, (d factor / dr) / r."""
-    k1, k2, _, _, k3 = dist
+    k1, k2, _, _, k3 = dist[:5]
     r = np.sqrt(np.maximum(r2, R2_SMALL))
     theta = np.arctan(r)
     t2 = theta * theta
@@ -45,13 +48,29 @@ def _fisheye_radial(r2: Scalars, dist: Distortion) -> tuple[Scalars, Scalars]:
     return factor, (rise - factor) / (r * r)
 
 
+def _radial(r2: Scalars, dist: Distortion, fisheye: bool) -> tuple[Scalars, Scalars]:
+    """Return the radial factor of a lens and its slope, (d factor / dr) / r."""
+    if fisheye:
+        return _fisheye_radial(r2, dist)
+    k1, k2, _, _, k3 = dist[:5]
+    factor = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))
+    if len(dist) == TERMS:
+        return factor, slope
+    k4, k5, k6 = dist[TERMS:]
+    below = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6))
+    below_slope = 2.0 * (k4 + r2 * (2.0 * k5 + r2 * 3.0 * k6))
+    factor = factor / below
+    return factor, (slope - factor * below_slope) / below
+
+
 def distort(
     x: Scalars, y: Scalars, dist: Distortion, *, fisheye: bool = False
 ) -> tuple[Scalars, Scalars]:
     """Return the distorted normalised coordinates of (x, y) (OpenCV's models)."""
-    k1, k2, p1, p2, k3 = dist
+    p1, p2 = dist[2:4]
     r2 = x * x + y * y
-    radial = _fisheye_radial(r2, dist)[0] if fisheye else 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    radial, _ = _radial(r2, dist, fisheye)
     xy2 = 2.0 * x * y
     xd = x * radial + p1 * xy2 + p2 * (r2 + 2.0 * x * x)
     yd = y * radial + p1 * (r2 + 2.0 * y * y) + p2 * xy2
@@ -62,13 +81,9 @@ def distort_jacobian(
     x: Scalars, y: Scalars, dist: Distortion, *, fisheye: bool = False
 ) -> tuple[Scalars, Scalars, Scalars, Scalars]:
     """Return d(xd)/dx, d(xd)/dy, d(yd)/dx, d(yd)/dy of `distort`."""
-    k1, k2, p1, p2, k3 = dist
+    p1, p2 = dist[2:4]
     r2 = x * x + y * y
-    if fisheye:
-        radial, slope = _fisheye_radial(r2, dist)
-    else:
-        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))
+    radial, slope = _radial(r2, dist, fisheye)
     cross = x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y
     xx = radial + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x
     yy = radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
@@ -109,6 +124,11 @@ class CameraModel:
     _t: tuple[float, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        if len(self.dist) not in {TERMS, TERMS if self.fisheye else RATIONAL_TERMS}:
+            raise ValueError(
+                f"dist has {len(self.dist)} terms: {TERMS} (k1, k2, p1, p2, k3) are needed, or"
+                f" {RATIONAL_TERMS} with k4, k5, k6 for a lens that is no fisheye"
+            )
         rotation = np.array(self.R_world_cam, dtype=np.float64).reshape(3, 3)
         centre = np.array(self.t_world_cam_m, dtype=np.float64).reshape(3)
         if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6):
@@ -119,6 +139,11 @@ class CameraModel:
         object.__setattr__(self, "t_world_cam_m", centre)
         object.__setattr__(self, "_r", tuple(map(float, rotation.ravel())))
         object.__setattr__(self, "_t", tuple(map(float, centre)))
+
+    @property
+    def rational(self) -> bool:
+        """Whether the radial terms are a quotient, with k4, k5 and k6 below."""
+        return len(self.dist) == RATIONAL_TERMS
 
     @property
     def K(self) -> Array:  # noqa: N802 - the name of the matrix everywhere

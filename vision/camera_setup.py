@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 def camera_model(config: CameraConfig) -> CameraModel:
     """Return the camera model at the configured resolution (world frame, m; pixels of the image)."""
     lens, pose = config.lens, config.pose
+    below = (lens.k4, lens.k5, lens.k6)
     rotation = (
         look_at(pose.eye_m, pose.target_m)
         if pose.R_world_cam is None
@@ -28,7 +29,7 @@ def camera_model(config: CameraConfig) -> CameraModel:
         lens.fy_px,
         lens.cx_px,
         lens.cy_px,
-        (lens.k1, lens.k2, lens.p1, lens.p2, lens.k3),
+        (lens.k1, lens.k2, lens.p1, lens.p2, lens.k3, *(below if any(below) else ())),
         rotation,
         np.array(pose.eye_m),
         fisheye=lens.fisheye,

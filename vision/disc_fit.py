@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from hil.core.errors import BadInput
 from vision import _marks
 from vision._marks import Disc as Disc  # noqa: PLC0414 - what a fit returns
-from vision.camera import CameraModel
+from vision.camera import TERMS, CameraModel
 
 if TYPE_CHECKING:
     from hil.core.rig import Picture
@@ -48,10 +48,11 @@ def compiled(model: CameraModel) -> _marks.Camera:
     """Return a camera model for the compiled parts."""
     return _marks.Camera(
         (model.fx_px, model.fy_px, model.cx_px, model.cy_px),
-        model.dist,
+        model.dist[:TERMS],
         model.R_world_cam.ravel().tolist(),
         model.t_world_cam_m.tolist(),
         model.fisheye,
+        model.dist[TERMS:] or (0.0, 0.0, 0.0),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -16,6 +16,7 @@ from vision.camera_setup import camera_model
 if TYPE_CHECKING:
     from vision.calibration.boards import Board
     from vision.calibration.colours import Sample
+    from vision.calibration.lens_fit import Kind
     from vision.calibration.points import PointPairs
     from vision.calibration.views import Views
 
@@ -55,7 +56,7 @@ command.add_command(marks)
 @file_option
 @click.option("--views", "wanted", type=click.IntRange(5, 200), default=20, show_default=True,
               help="Views to take from a live camera.")  # fmt: skip
-@click.option("--lens", "kind", type=click.Choice(["auto", "pinhole", "fisheye"]), default="auto",
+@click.option("--lens", "kind", type=click.Choice(["auto", "pinhole", "fisheye", "rational"]), default="auto",
               show_default=True, help="auto: what fits views it was not fitted to.")  # fmt: skip
 @picture_option
 @json_option
@@ -64,7 +65,7 @@ def camera(
     board_text: str,
     detector: str,
     camera_file: Path,
-    kind: str,
+    kind: Kind | Literal["auto"],
     wanted: int,
     picture: Path | None,
     as_json: bool,

@@ -30,6 +30,10 @@ Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 
 
+# What the radial terms of a lens without divisor reach at most; those of a quotient may balance it.
+PLAIN_LIMITS = {"k1": 1.0, "k2": 2.0, "k3": 2.0}
+
+
 class LensConfig(Section):
     """Intrinsics at a reference width; other resolutions scale by width and crop rows evenly."""
 
@@ -46,10 +50,10 @@ class LensConfig(Section):
         description="k1 to k3 are terms of the ray's angle from the axis (a wide lens), not of its tangent",
     )
     k1: float = quantity(
-        "", "barrel", -0.16, ge=-1.0, le=1.0, source="half that of OpenCV's samples"
+        "", "barrel", -0.16, ge=-50.0, le=50.0, source="half that of OpenCV's samples"
     )
     k2: float = quantity(
-        "", "radial, 4th order", 0.04, ge=-2.0, le=2.0, source="assumed: keeps the map monotonic"
+        "", "radial, 4th order", 0.04, ge=-50.0, le=50.0, source="assumed: keeps the map monotonic"
     )
     p1: float = quantity(
         "", "decentring", 0.0008, ge=-0.1, le=0.1, source="assumed: of the usual size"
@@ -57,12 +61,35 @@ class LensConfig(Section):
     p2: float = quantity(
         "", "decentring", -0.0005, ge=-0.1, le=0.1, source="assumed: of the usual size"
     )
-    k3: float = quantity("", "not needed below 60 deg", 0.0, ge=-2.0, le=2.0)
+    k3: float = quantity("", "not needed below 60 deg", 0.0, ge=-50.0, le=50.0)
+    k4: float = quantity(
+        "", "of a rational lens (wide), as k1 but in the divisor", 0.0, ge=-50.0, le=50.0
+    )
+    k5: float = quantity("", "the same, 4th order", 0.0, ge=-50.0, le=50.0)
+    k6: float = quantity("", "the same, 6th order", 0.0, ge=-50.0, le=50.0)
     shift_degree: int = quantity(
         "", "of the pixel correction by `hil calibrate floor --correct`", 0, ge=0, le=7
     )
     shift_u: tuple[float, ...] = quantity("half widths", "its terms in half widths, for u", ())
     shift_v: tuple[float, ...] = quantity("half widths", "its terms in half widths, for v", ())
+
+    @model_validator(mode="after")
+    def _check_kind(self) -> LensConfig:
+        """Refuse a quotient for a fisheye, and radial terms that only a quotient has."""
+        below = {name: getattr(self, name) for name in ("k4", "k5", "k6")}
+        if self.fisheye and any(below.values()):
+            name, value = next((n, v) for n, v in below.items() if v)
+            raise ValueError(
+                f"{name} = {value:g} with fisheye = true: a fisheye has k1, k2 and k3 alone; leave"
+                " k4 to k6 at 0, or fisheye at false"
+            )
+        for name, limit in PLAIN_LIMITS.items():
+            if not any(below.values()) and abs(getattr(self, name)) > limit:
+                raise ValueError(
+                    f"{name} = {getattr(self, name):g}, the limits are {-limit:g} to {limit:g} for a"
+                    " lens without k4, k5 and k6"
+                )
+        return self
 
     @model_validator(mode="after")
     def _check_shift(self) -> LensConfig:

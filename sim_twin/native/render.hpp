@@ -36,6 +36,7 @@ struct View {
   int width = 0, height = 0;              // px
   double fx = 0, fy = 0, cx = 0, cy = 0;  // px
   std::array<double, 5> dist{};           // k1 k2 p1 p2 k3
+  std::array<double, 3> below{};          // k4 k5 k6 of a rational lens, 0 for none
   bool fisheye = false;                   // radial terms of the angle from the axis
   std::array<double, 9> R{};              // camera to world, by rows
   std::array<double, 3> t{};              // camera centre, m

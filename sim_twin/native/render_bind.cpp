@@ -133,6 +133,7 @@ void bind_render(nb::module_& m) {
       .def_rw("cx", &View::cx)
       .def_rw("cy", &View::cy)
       .def_rw("dist", &View::dist)
+      .def_rw("below", &View::below)
       .def_rw("fisheye", &View::fisheye)
       .def_rw("R", &View::R)
       .def_rw("t", &View::t);

@@ -10,7 +10,10 @@ namespace {
 // The factor by which the lens moves a normalised point away from the axis.
 double radial_factor(const View& view, double r2) {
   const auto [k1, k2, p1, p2, k3] = view.dist;
-  if (!view.fisheye) return 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  if (!view.fisheye) {
+    const auto [k4, k5, k6] = view.below;
+    return (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)));
+  }
   const double r = std::sqrt(std::max(r2, 1e-10)), theta = std::atan(r), t2 = theta * theta;
   return theta * (1.0 + t2 * (k1 + t2 * (k2 + t2 * k3))) / r;
 }

@@ -19,7 +19,8 @@ from hil.core.files import parse_toml
 from vision.calibration.colours import ColourCalibration
 from vision.calibration.floor import FloorCalibration
 from vision.calibration.intrinsics import LensCalibration
-from vision.calibration.plausible import LENS_NAMES
+from vision.calibration.lens_fit import KINDS
+from vision.calibration.plausible import named
 from vision.correction import CorrectedCamera
 from vision.cv_compat import write_atomic
 
@@ -130,18 +131,18 @@ def lens_tables(calibration: LensCalibration) -> list[Table]:
         f"standard deviation of fx {calibration.sigma[0]:.2f} px, of cx"
         f" {calibration.sigma[2]:.2f} px; image covered {calibration.coverage_ratio:.0%}",
     ]
-    lens = dict(zip(LENS_NAMES, map(float, calibration.lens), strict=True))
+    lens = {**at_size, "fisheye": calibration.fisheye, **named(calibration.lens)}
     return [
         Table("", size),
-        Table("lens", {**at_size, "fisheye": calibration.fisheye, **lens}, comments),
+        Table("lens", lens, comments),
     ]
 
 
 def _kind_comment(calibration: LensCalibration) -> list[str]:
     if not calibration.evidence_px:
         return []
-    pinhole_px, fisheye_px = calibration.evidence_px
-    return [f"median view, held out: pinhole {pinhole_px:.3f} px, fisheye {fisheye_px:.3f} px"]
+    figures = zip(KINDS, calibration.evidence_px, strict=True)
+    return [f"median view, held out: {', '.join(f'{kind} {px:.3f} px' for kind, px in figures)}"]
 
 
 def floor_tables(result: FloorCalibration, with_lens: bool) -> list[Table]:
@@ -161,7 +162,7 @@ def floor_tables(result: FloorCalibration, with_lens: bool) -> list[Table]:
     size = {"width_px": camera.width_px, "height_px": camera.height_px}
     numbers = (camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, *camera.dist)
     lens: dict[str, Value] = {f"at_{key}": value for key, value in size.items()}
-    lens |= {"fisheye": camera.fisheye, **dict(zip(LENS_NAMES, numbers, strict=True))}
+    lens |= {"fisheye": camera.fisheye, **named(numbers)}
     if isinstance(camera, CorrectedCamera):
         lens["shift_degree"] = camera.degree
         for axis, name in enumerate(("shift_u", "shift_v")):

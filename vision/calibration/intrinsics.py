@@ -1,6 +1,7 @@
 """Lens calibration from views of a board: outlier views dropped by name, hold-out error, coverage.
 
-Whether the lens is a fisheye is told by evidence: the error on views that it was not fitted to.
+Whether the lens is a fisheye or a rational one is told by evidence: the error on views that it was
+not fitted to.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +19,7 @@ from hil.core.wording import past
 from vision import cv_compat
 from vision.calibration.advice import Sight, advise, coverage
 from vision.calibration.boards import BoardView
-from vision.calibration.lens_fit import Lens, LensFit, fit_lens
+from vision.calibration.lens_fit import KINDS, Kind, Lens, LensFit, fit_lens
 from vision.calibration.plausible import check_lens
 from vision.camera import CameraModel
 
@@ -40,9 +42,10 @@ OUTLIER_DEVIATIONS = 4.0
 OUTLIER_FACTOR = 2.0
 DROP_RATIO_MAX = 0.34
 JUDGED_MAX = 24
-# A fisheye is taken where its error on held-out views is less by this factor and by so many pixels.
-FISHEYE_FACTOR = 1.15
-FISHEYE_GAIN_PX = 0.02
+# Another kind of lens than the plainer one is taken where its error on held-out views is less by this
+# factor and by so many pixels.
+KIND_FACTOR = 1.15
+KIND_GAIN_PX = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,10 +76,9 @@ class ViewResult:
 class LensCalibration:
     """A lens with what is known about its worth.
 
-    `lens` is (fx, fy, cx, cy, k1, k2, p1, p2, k3) and `sigma` its standard deviations, of a fisheye
-    lens or not. `evidence_px` has the median view's error on held-out views for a pinhole and for a
-    fisheye lens, infinite where there is none, empty where it was not asked. `held_out_px`
-    is the RMS residual over views the lens was not fitted to, their pose being solved anew.
+    `lens` is (fx, fy, cx, cy, k1, k2, p1, p2, k3), of a rational lens also k4, k5, k6, and `sigma`
+    its standard deviations. `evidence_px` has the median view's error on held-out views for each of
+    KINDS, infinite where there is none, empty where it was not asked. `held_out_px` is the RMS residual over views the lens was not fitted to, their pose being solved anew.
     `corners_px` and `residuals_px` (seen minus projected) are (N, 2), over all views kept.
     `alike` names views that show the board where another does, with that other one.
     """
@@ -96,24 +98,31 @@ class LensCalibration:
     fisheye: bool = False
     evidence_px: tuple[float, ...] = ()
 
+    @property
+    def kind(self) -> Kind:
+        """Pinhole, fisheye or rational."""
+        return Lens(self.lens, self.fisheye).kind
+
     def model(self) -> CameraModel:
         """Return the lens as a camera at the world's origin that looks along world z."""
         return Lens(self.lens, self.fisheye).camera((self.width_px, self.height_px))
 
 
 def calibrate_lens(
-    views: Sequence[BoardView], size_px: tuple[int, int], kind: str = "auto"
+    views: Sequence[BoardView], size_px: tuple[int, int], kind: Kind | Literal["auto"] = "auto"
 ) -> LensCalibration:
     """Fit the lens to the views, at least 5 that differ; raises BadInput for one not to be believed.
 
-    `kind` is "pinhole", "fisheye", or "auto": what held-out views say.
+    `kind` is one of KINDS, or "auto": what held-out views say.
     Views alike count once, outlier views are dropped one by one. Refused are a lens that no camera
     has, one whose focal length is uncertain, and one that misses views it was not fitted to.
     """
     differing, alike = _differing(views, size_px)
-    evidence_px = _evidence(differing, size_px) if kind == "auto" else ()
-    fisheye = _says_fisheye(*evidence_px) if evidence_px else kind == "fisheye"
-    kept, dropped, fit, left_out = _fit_without_outliers(differing, alike, size_px, fisheye)
+    evidence_px: tuple[float, ...] = ()
+    if kind == "auto":
+        evidence_px = _evidence(differing, size_px)
+        kind = _told_kind(evidence_px)
+    kept, dropped, fit, left_out = _fit_without_outliers(differing, alike, size_px, kind)
     tilts = [_tilt_deg(place) for place in fit.places]
     check_lens(fit.lens.numbers, fit.sigma, size_px, tilts)
     results = _results(kept, fit, left_out, tilts, size_px)
@@ -133,28 +142,31 @@ def calibrate_lens(
         np.vstack([view.px for view in kept]),
         np.vstack([fit.lens.residuals(view, place) for view, place in pairs]),
         alike,
-        fisheye,
+        fit.lens.fisheye,
         evidence_px,
     )
 
 
 def _evidence(views: Sequence[BoardView], size_px: tuple[int, int]) -> tuple[float, ...]:
-    """Return the median view's error under the other half's lens, px: pinhole, then fisheye."""
+    """Return the median view's error under the other half's lens, px, for each of KINDS."""
     if len(views) < 2 * VIEWS_MIN:
         return ()
     found = []
-    for fisheye in (False, True):
+    for kind in KINDS:
         try:
-            found.append(float(np.median(_held_out(views, size_px, fisheye)[0])))
+            found.append(float(np.median(_held_out(views, size_px, kind)[0])))
         except BadInput:
             found.append(math.inf)
     return tuple(found)
 
 
-def _says_fisheye(pinhole_px: float, fisheye_px: float) -> bool:
-    if not math.isfinite(pinhole_px):
-        return math.isfinite(fisheye_px)
-    return fisheye_px * FISHEYE_FACTOR < pinhole_px and pinhole_px - fisheye_px > FISHEYE_GAIN_PX
+def _told_kind(evidence_px: tuple[float, ...]) -> Kind:
+    """Return the plainest kind that no other beats by the factor and the pixels needed."""
+    chosen, least_px = KINDS[0], evidence_px[0] if evidence_px else math.nan
+    for kind, px in zip(KINDS[1:], evidence_px[1:], strict=False):
+        if px * KIND_FACTOR < least_px and px + KIND_GAIN_PX < least_px:
+            chosen, least_px = kind, px
+    return chosen
 
 
 def _differing(
@@ -191,7 +203,7 @@ def _fit_without_outliers(
     views: list[BoardView],
     alike: tuple[tuple[str, str], ...],
     size_px: tuple[int, int],
-    fisheye: bool,
+    kind: Kind,
 ) -> tuple[list[BoardView], list[Dropped], LensFit, Array]:
     """Return the views kept, those dropped, the fit, and the errors of kept views left out of it."""
     kept = list(views)
@@ -203,7 +215,7 @@ def _fit_without_outliers(
                 f"lens: {len(kept)} usable views of the board that differ{same}, at least {VIEWS_MIN}"
                 " are needed; add views from other sides and tilts"
             )
-        fit = fit_lens(kept, size_px, fisheye=fisheye)
+        fit = fit_lens(kept, size_px, kind)
         left_out, rest_px = _left_out(kept, fit, size_px)
         outliers = [k for k in range(len(kept)) if _is_outlier(left_out, k)]
         if not outliers:
@@ -234,7 +246,7 @@ def _left_out(
         others = [*views[:k], *views[k + 1 :]]
         try:
             start = fit.lens, np.delete(fit.places, k, axis=0)
-            without = fit_lens(others, size_px, fisheye=fit.lens.fisheye, start=start)
+            without = fit_lens(others, size_px, fit.lens.kind, start=start)
         except BadInput:  # the others alone determine none: the view is judged in the fit
             continue
         lens, rest_px[k] = without.lens, _rms(without.errors, others)
@@ -268,7 +280,7 @@ def _results(
     size_px: tuple[int, int],
 ) -> list[ViewResult]:
     """Return each view's figures; where the hold-out fails, without corners one view alone reaches."""
-    held_out, alone = _held_out(kept, size_px, fit.lens.fisheye)
+    held_out, alone = _held_out(kept, size_px, fit.lens.kind)
     enough = _rms(np.array(held_out), kept) <= HELD_OUT_MAX_PX
     if enough or np.sum(np.isfinite(alone)) > max(1.0, ALONE_VIEWS_RATIO * len(kept)):
         alone = [math.nan] * len(kept)
@@ -308,7 +320,7 @@ def _advise_alone(results: Sequence[ViewResult]) -> list[str]:
 
 
 def _held_out(
-    views: Sequence[BoardView], size_px: tuple[int, int], fisheye: bool
+    views: Sequence[BoardView], size_px: tuple[int, int], kind: Kind
 ) -> tuple[list[float], list[float]]:
     """Return each view's RMS residual in px under a lens fitted to the other half of the views.
 
@@ -318,7 +330,7 @@ def _held_out(
     errors, alone = [math.nan] * len(views), [math.nan] * len(views)
     for fold in (0, 1):
         train = [view for k, view in enumerate(views) if k % 2 != fold]
-        lens = fit_lens(train, size_px, fisheye=fisheye).lens
+        lens = fit_lens(train, size_px, kind).lens
         reach_px = _reach_px(train, lens)
         for k in range(fold, len(views), 2):
             errors[k] = lens.error_px(views[k])

@@ -1,4 +1,4 @@
-"""One lens fitted to views of a board: OpenCV's pinhole with five terms, or a fisheye.
+"""One lens fitted to views of a board: OpenCV's pinhole of five terms or rational of eight, or a fisheye.
 
 The fisheye is that of `vision.camera`, three terms of the ray's angle. It is fitted here by
 Levenberg and Marquardt over lens and board places, starting from the best of some focal lengths:
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,13 @@ from numpy.typing import NDArray
 from hil.core.errors import BadInput
 from vision import cv_compat
 from vision.calibration.boards import BoardView
+from vision.calibration.plausible import RATIONAL_NAMES, check_rational
 from vision.camera import CameraModel, distort
 
 Array = NDArray[np.float64]
 Size = tuple[int, int]
+Kind = Literal["pinhole", "fisheye", "rational"]
+KINDS: tuple[Kind, ...] = get_args(Kind)  # the plainer first
 
 # What of the nine lens numbers a fisheye fit moves: all but the decentring p1 and p2.
 FREE = np.array([0, 1, 2, 3, 4, 5, 8])
@@ -36,17 +40,23 @@ RAY_MAX = 12.0  # tan 85 deg: corners further out say nothing of a board's place
 
 @dataclass(frozen=True, slots=True)
 class Lens:
-    """(fx, fy, cx, cy, k1, k2, p1, p2, k3) of a pinhole or a fisheye lens, px and plain numbers."""
+    """(fx, fy, cx, cy, k1, k2, p1, p2, k3), px and plain numbers; a rational one also k4, k5, k6."""
 
     numbers: Array
     fisheye: bool = False
 
+    @property
+    def kind(self) -> Kind:
+        """Pinhole, fisheye or rational."""
+        if self.fisheye:
+            return "fisheye"
+        return "rational" if len(self.numbers) == len(RATIONAL_NAMES) else "pinhole"
+
     def camera(self, size_px: Size) -> CameraModel:
         """Return the lens as a camera at the world's origin that looks along world z."""
-        fx, fy, cx, cy, k1, k2, p1, p2, k3 = map(float, self.numbers)
-        dist = (k1, k2, p1, p2, k3)
+        fx, fy, cx, cy, *dist = map(float, self.numbers)
         at = (np.eye(3), np.zeros(3))
-        return CameraModel(*size_px, fx, fy, cx, cy, dist, *at, fisheye=self.fisheye)
+        return CameraModel(*size_px, fx, fy, cx, cy, tuple(dist), *at, fisheye=self.fisheye)
 
     def project(self, place: Array, board_m: Array) -> Array:
         """Return the pixels, (N, 2), of board points, (N, 3), at a place, (6,)."""
@@ -98,8 +108,8 @@ class LensFit:
 def fit_lens(
     views: Sequence[BoardView],
     size_px: Size,
+    kind: Kind = "pinhole",
     *,
-    fisheye: bool = False,
     start: tuple[Lens, Array] | None = None,
 ) -> LensFit:
     """Return the lens fitted to the views; raises BadInput where they do not determine one.
@@ -107,14 +117,17 @@ def fit_lens(
     `start` is a fisheye lens near the answer, with the views' places.
     """
     try:
-        if fisheye:
+        if kind == "fisheye":
             if start is not None:
                 return _fit_fisheye(views, *start, STEPS_FROM_NEAR)
             return _fit_fisheye(views, *_start(views, size_px), STEPS_MAX)
-        fit = cv_compat.calibrate([v.board_m for v in views], [v.px for v in views], size_px)
+        boards, seen = [v.board_m for v in views], [v.px for v in views]
+        fit = cv_compat.calibrate(boards, seen, size_px, rational=kind == "rational")
     except (cv_compat.CvError, np.linalg.LinAlgError) as error:
         text = str(error).split("error:")[-1].split("\n")[0].strip()
         raise BadInput(f"lens: the views do not determine one ({text}); tilt the board") from None
+    if kind == "rational":
+        check_rational(fit[0], np.vstack(seen))
     return LensFit(Lens(fit[0]), *fit[1:])
 
 

@@ -9,7 +9,8 @@ from typing import Any
 
 from vision.calibration.floor import FloorCalibration, error_budget
 from vision.calibration.intrinsics import LensCalibration
-from vision.calibration.plausible import LENS_NAMES
+from vision.calibration.lens_fit import KINDS
+from vision.calibration.plausible import named
 from vision.calibration.views import Views
 
 HEIGHT_ADVICE = (
@@ -24,10 +25,11 @@ def lens_document(result: LensCalibration, views: Views, file: Path) -> dict[str
         "camera_file": str(file),
         "width_px": result.width_px,
         "height_px": result.height_px,
-        "lens": dict(zip(LENS_NAMES, map(float, result.lens), strict=True)),
+        "lens": named(result.lens),
+        "kind": result.kind,
         "fisheye": result.fisheye,
-        "evidence_px": dict(zip(("pinhole", "fisheye"), result.evidence_px, strict=False)),
-        "sigma": dict(zip(LENS_NAMES, map(float, result.sigma), strict=True)),
+        "evidence_px": dict(zip(KINDS, result.evidence_px, strict=False)),
+        "sigma": named(result.sigma),
         "error_px": result.error_px,
         "held_out_px": result.held_out_px,
         "coverage_ratio": result.coverage_ratio,
@@ -47,22 +49,21 @@ def lens_document(result: LensCalibration, views: Views, file: Path) -> dict[str
 def lens_text(result: LensCalibration, views: Views, file: Path) -> str:
     """Return the lens calibration as lines."""
     fx, fy, cx, cy = result.lens[:4]
-    kind = "fisheye" if result.fisheye else "pinhole"
     lines = [
-        f"{kind} lens at {result.width_px} x {result.height_px} px: focal length"
+        f"{result.kind} lens at {result.width_px} x {result.height_px} px: focal length"
         f" {fx:.2f} x {fy:.2f} px"
         f" (sigma {result.sigma[0]:.2f}, {result.sigma[0] / fx:.1%}), centre ({cx:.2f}, {cy:.2f}) px",
-        "distortion k1 k2 p1 p2 k3: " + " ".join(f"{k:.5f}" for k in result.lens[4:]),
+        f"distortion {' '.join(list(named(result.lens))[4:])}: "
+        + " ".join(f"{k:.5f}" for k in result.lens[4:]),
         f"residual {result.error_px:.3f} px RMS, on held-out views {result.held_out_px:.3f} px RMS;"
         f" image covered {result.coverage_ratio:.0%}",
     ]
     if result.evidence_px:
-        pinhole, fisheye = (
-            f"{px:.3f} px" if math.isfinite(px) else "none" for px in result.evidence_px
-        )
-        lines.append(
-            f"kind of lens by the median held-out view: pinhole {pinhole}, fisheye {fisheye}"
-        )
+        figures = [
+            f"{kind} {f'{px:.3f} px' if math.isfinite(px) else 'none'}"
+            for kind, px in zip(KINDS, result.evidence_px, strict=True)
+        ]
+        lines.append(f"kind of lens by the median held-out view: {', '.join(figures)}")
     usual_px = _usual_px(result)
     lines += [
         f"dropped {v.name}: {v.left_out_px:.2f} px off the lens of all others, where they have"

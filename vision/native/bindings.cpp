@@ -194,8 +194,11 @@ NB_MODULE(_marks, m) {
           "__init__",
           [](Camera* self, const std::array<double, 4>& lens, const std::array<double, 5>& distortion,
              const std::array<double, 9>& rotation, const std::array<double, 3>& centre_m,
-             bool fisheye) { new (self) Camera{lens, distortion, rotation, centre_m, fisheye}; },
-          "lens"_a, "distortion"_a, "rotation"_a, "centre_m"_a, "fisheye"_a = false);
+             bool fisheye, const std::array<double, 3>& below) {
+            new (self) Camera{lens, distortion, rotation, centre_m, fisheye, below};
+          },
+          "lens"_a, "distortion"_a, "rotation"_a, "centre_m"_a, "fisheye"_a = false,
+          "below"_a = std::array<double, 3>{});
   bind_rims(m);
   bind_place(m);
   bind_search(m);

@@ -24,7 +24,21 @@ Camera::Radial Camera::fisheye_radial(double r2) const {
   return {factor, (rise - factor) / (r * r)};
 }
 
+Camera::Radial Camera::rational_radial(double r2) const {
+  const auto& [k1, k2, p1, p2, k3] = distortion;
+  const auto& [k4, k5, k6] = below;
+  const double over = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  const double over_slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3));
+  const double under = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6));
+  const double under_slope = 2.0 * (k4 + r2 * (2.0 * k5 + r2 * 3.0 * k6));
+  const double factor = over / under;
+  return {factor, (over_slope - factor * under_slope) / under};
+}
+
 Camera::Radial Camera::bend(double r2) const {
+  if (rational) {
+    return rational_radial(r2);
+  }
   const auto& [k1, k2, p1, p2, k3] = distortion;
   return fisheye
              ? fisheye_radial(r2)
@@ -42,7 +56,9 @@ std::array<double, 3> Camera::distort_slope(Vec2 at) const {
 Vec2 Camera::distort(Vec2 at) const {
   const auto& [k1, k2, p1, p2, k3] = distortion;
   const double r2 = at.x * at.x + at.y * at.y;
-  const double radial = fisheye ? fisheye_radial(r2).factor : 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  const double radial = rational  ? rational_radial(r2).factor
+                        : fisheye ? fisheye_radial(r2).factor
+                                  : 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
   const double xy2 = 2.0 * at.x * at.y;
   return {at.x * radial + p1 * xy2 + p2 * (r2 + 2.0 * at.x * at.x),
           at.y * radial + p1 * (r2 + 2.0 * at.y * at.y) + p2 * xy2};

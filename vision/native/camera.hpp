@@ -1,4 +1,4 @@
-// Pinhole camera with five-term distortion over a floor: vision/camera.py, for the inner loops.
+// Pinhole camera with five or eight terms of distortion over a floor: vision/camera.py, for the inner loops.
 // World axes and metres, pixels with (0, 0) at the centre of the first; NaN where there is no answer.
 #pragma once
 
@@ -24,6 +24,8 @@ struct Camera {
   std::array<double, 9> rotation;    // R_world_cam, row by row
   std::array<double, 3> centre_m;    // t_world_cam
   bool fisheye = false;              // radial terms of the angle from the axis
+  std::array<double, 3> below{};     // k4, k5, k6 of a rational lens, 0 for none
+  bool rational = below != std::array<double, 3>{};
 
   // The pixel of a world point.
   Vec2 project(Vec2 point_m, double z_m) const;
@@ -39,6 +41,7 @@ struct Camera {
     double slope;  // (d factor / dr) / r
   };
   Radial fisheye_radial(double r2) const;
+  Radial rational_radial(double r2) const;
   Radial bend(double r2) const;
   Vec2 distort(Vec2 at) const;
   // d(distorted)/d(undistorted): xx, xy = yx, yy.
