@@ -36,9 +36,6 @@ CvError = cv2.error
 
 CORNER_WINDOW_PX = 11
 ITERATIONS = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 100, 1e-4)
-# OpenCV's own of calibrateCamera; a quotient's terms balance each other and need more.
-LENS_ITERATIONS = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 30, np.finfo(float).eps)
-RATIONAL_ITERATIONS = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 200, 1e-9)
 # Half of each tag cell's width left out of the vote: bits survive blur and a slanted view.
 CELL_MARGIN_RATIO = 0.3
 CORNER_WINDOW_CELLS = 0.8
@@ -244,33 +241,26 @@ def find_chessboard(
 
 
 def calibrate(
-    board_points: list[Array],
-    image_points: list[Array],
-    size_px: tuple[int, int],
-    *,
-    rational: bool = False,
+    board_points: list[Array], image_points: list[Array], size_px: tuple[int, int]
 ) -> tuple[Array, Array, Array, Array]:
-    """Fit one pinhole lens (k1, k2, p1, p2, k3), `rational` with k4 to k6, to views of a flat board.
+    """Fit one pinhole lens (k1, k2, p1, p2, k3) to views of a flat board.
 
     `board_points` are (N, 3) in m and `image_points` (N, 2) in px for each view. Returns
-    (fx, fy, cx, cy, k1, k2, p1, p2, k3[, k4, k5, k6]), their standard deviations in the same order, the RMS
+    (fx, fy, cx, cy, k1, k2, p1, p2, k3), their standard deviations in the same order, the RMS
     residual of each view in px, and each view's rotation and translation vectors, (V, 6).
     """
-    terms = 8 if rational else 5
     result = cv2.calibrateCameraExtended(
         [p.astype(np.float32) for p in board_points],
         [p.astype(np.float32) for p in image_points],
         size_px,
         np.eye(3),
-        np.zeros(terms),
-        flags=cv2.CALIB_RATIONAL_MODEL if rational else 0,
-        criteria=RATIONAL_ITERATIONS if rational else LENS_ITERATIONS,
+        np.zeros(5),
     )
     _, matrix, dist, turns, shifts, sigmas, _, errors = result
     k = np.asarray(matrix)
-    lens = np.r_[k[0, 0], k[1, 1], k[0, 2], k[1, 2], np.asarray(dist).ravel()[:terms]]
+    lens = np.r_[k[0, 0], k[1, 1], k[0, 2], k[1, 2], np.asarray(dist).ravel()[:5]]
     places: Array = np.hstack([_flat(turns).reshape(-1, 3), _flat(shifts).reshape(-1, 3)])
-    return lens, _flat(sigmas)[: 4 + terms], _flat(errors), places
+    return lens, _flat(sigmas)[:9], _flat(errors), places
 
 
 def board_place(lens: Array, board_points: Array, image_points: Array) -> Array:

@@ -1,7 +1,8 @@
 """One lens fitted to views of a board: OpenCV's pinhole of five terms or rational of eight, or a fisheye.
 
-The fisheye is that of `vision.camera`, three terms of the ray's angle. It is fitted here by
-Levenberg and Marquardt over lens and board places, starting from the best of some focal lengths:
+The fisheye is that of `vision.camera`, three terms of the ray's angle. It and the rational lens,
+which OpenCV's steps lead to poles within the image now and then, are fitted here by
+Levenberg and Marquardt over lens and board places, starting from the pinhole, or the best of some focal lengths:
 `cv2.fisheye.calibrate` gives no standard deviations, gives up on good views now and then, and its
 settings moved between OpenCV 4 and 5.
 """
@@ -26,8 +27,11 @@ Size = tuple[int, int]
 Kind = Literal["pinhole", "fisheye", "rational"]
 KINDS: tuple[Kind, ...] = get_args(Kind)  # the plainer first
 
-# What of the nine lens numbers a fisheye fit moves: all but the decentring p1 and p2.
-FREE = np.array([0, 1, 2, 3, 4, 5, 8])
+# What of the lens numbers a fit moves: of a fisheye all but the decentring p1 and p2.
+FREE = {"fisheye": np.array([0, 1, 2, 3, 4, 5, 8]), "rational": np.arange(12)}
+# The terms of a quotient balance each other: where the corners leave them open they stay near 0,
+# as if each had been measured as 0 +- 1 beside corners of 0.1 px.
+RIDGE = {"fisheye": np.zeros(7), "rational": np.r_[np.zeros(4), 0.1, 0.1, 0.0, 0.0, np.full(4, 0.1)]}
 STARTS_F_RATIO = (0.2, 0.3, 0.45, 0.7, 1.0, 1.6)  # focal lengths over the image's width
 START_VIEWS = 5
 STEPS_MAX = 40
@@ -62,10 +66,13 @@ class Lens:
         """Return the pixels, (N, 2), of board points, (N, 3), at a place, (6,)."""
         if not self.fisheye:
             return cv_compat.project(self.numbers, place, board_m)
-        seen = board_m @ cv_compat.rotation(place[:3]).T + place[3:]
+        return self.pixels(board_m @ cv_compat.rotation(place[:3]).T + place[3:])
+
+    def pixels(self, seen: Array) -> Array:
+        """Return the pixels, (N, 2), of points in the camera's axes, (N, 3), m."""
         z = np.maximum(seen[:, 2], 1e-6)
         fx, fy, cx, cy, *dist = self.numbers
-        u, v = distort(seen[:, 0] / z, seen[:, 1] / z, (*dist,), fisheye=True)
+        u, v = distort(seen[:, 0] / z, seen[:, 1] / z, (*dist,), fisheye=self.fisheye)
         return np.column_stack((fx * u + cx, fy * v + cy))
 
     def place(self, view: BoardView, steps: int = 3) -> Array:
@@ -114,24 +121,28 @@ def fit_lens(
 ) -> LensFit:
     """Return the lens fitted to the views; raises BadInput where they do not determine one.
 
-    `start` is a fisheye lens near the answer, with the views' places.
+    `start` is a fisheye or rational lens near the answer, with the views' places.
     """
     try:
         if kind == "fisheye":
             if start is not None:
-                return _fit_fisheye(views, *start, STEPS_FROM_NEAR)
-            return _fit_fisheye(views, *_start(views, size_px), STEPS_MAX)
-        boards, seen = [v.board_m for v in views], [v.px for v in views]
-        fit = cv_compat.calibrate(boards, seen, size_px, rational=kind == "rational")
+                return _fit_steps(views, *start, STEPS_FROM_NEAR)
+            return _fit_steps(views, *_start(views, size_px), STEPS_MAX)
+        if kind == "rational" and start is not None:
+            return _fit_steps(views, *start, STEPS_FROM_NEAR)
+        fit = cv_compat.calibrate([v.board_m for v in views], [v.px for v in views], size_px)
+        if kind == "rational":
+            found = _fit_steps(views, Lens(np.r_[fit[0], np.zeros(3)]), fit[3], STEPS_MAX)
+            check_rational(found.lens.numbers, np.vstack([view.px for view in views]))
+            return found
     except (cv_compat.CvError, np.linalg.LinAlgError) as error:
         text = str(error).split("error:")[-1].split("\n")[0].strip()
         raise BadInput(f"lens: the views do not determine one ({text}); tilt the board") from None
-    if kind == "rational":
-        check_rational(fit[0], np.vstack(seen))
     return LensFit(Lens(fit[0]), *fit[1:])
 
 
-def _fit_fisheye(views: Sequence[BoardView], lens: Lens, places: Array, steps_max: int) -> LensFit:
+def _fit_steps(views: Sequence[BoardView], lens: Lens, places: Array, steps_max: int) -> LensFit:
+    free = FREE[lens.kind]
     damping, cost = 1e-3, _cost(lens, views, places)
     for _ in range(steps_max):
         rest, slopes = _system(lens, views, places)
@@ -140,8 +151,8 @@ def _fit_fisheye(views: Sequence[BoardView], lens: Lens, places: Array, steps_ma
         while damping < DAMPING_MAX:
             step = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12), right)
             numbers = lens.numbers.copy()
-            numbers[FREE] += step[: len(FREE)]
-            tried, moved = Lens(numbers, True), places + step[len(FREE) :].reshape(-1, 6)
+            numbers[free] += step[: len(free)]
+            tried, moved = Lens(numbers, lens.fisheye), places + step[len(free) :].reshape(-1, 6)
             new = _cost(tried, views, moved)
             if new < cost:
                 lens, places, cost, damping = tried, moved, new, 0.1 * damping
@@ -172,46 +183,67 @@ def _start(views: Sequence[BoardView], size_px: Size) -> tuple[Lens, Array]:
 
 def _judged(lens: Lens, views: Sequence[BoardView], places: Array) -> LensFit:
     rest, slopes = _system(lens, views, places)
-    noise = float(np.sum(rest**2)) / max(1, len(rest) - slopes.shape[1])
+    noise = float(np.sum(rest**2)) / max(1, len(rest) - len(RIDGE[lens.kind]) - slopes.shape[1])
     covariance = noise * np.linalg.pinv(slopes.T @ slopes)
-    sigma = np.zeros(9)
-    sigma[FREE] = np.sqrt(np.maximum(np.diag(covariance)[: len(FREE)], 0.0))
+    free, sigma = FREE[lens.kind], np.zeros(len(lens.numbers))
+    sigma[free] = np.sqrt(np.maximum(np.diag(covariance)[: len(free)], 0.0))
     pairs = zip(views, places, strict=True)
     errors = np.array([_rms(lens.residuals(view, place)) for view, place in pairs])
     return LensFit(lens, sigma, errors, places)
 
 
+@dataclass(frozen=True, slots=True)
+class _Corners:
+    """The corners of all views under one another: on the board, seen, and of which view, (N,)."""
+
+    board_m: Array
+    px: Array
+    view: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, views: Sequence[BoardView]) -> _Corners:
+        counts = [len(view.px) for view in views]
+        board_m = np.vstack([view.board_m for view in views])
+        return cls(board_m, np.vstack([v.px for v in views]), np.repeat(np.arange(len(views)), counts))
+
+    def project(self, lens: Lens, places: Array) -> Array:
+        """Return the pixels, (N, 2), of all corners, the boards being at their places, (V, 6)."""
+        turns = np.array([cv_compat.rotation(place[:3]) for place in places])
+        seen = np.einsum("nij,nj->ni", turns[self.view], self.board_m) + places[self.view, 3:]
+        return lens.pixels(seen)
+
+    def rest(self, lens: Lens, places: Array) -> Array:
+        """Return seen minus projected pixels, (2 N,)."""
+        return np.asarray((self.px - self.project(lens, places)).ravel())
+
+
 def _cost(lens: Lens, views: Sequence[BoardView], places: Array) -> float:
-    pairs = zip(views, places, strict=True)
-    return float(sum(np.sum(lens.residuals(view, place) ** 2) for view, place in pairs))
+    ridge = RIDGE[lens.kind] * lens.numbers[FREE[lens.kind]]
+    return float(np.sum(_Corners.of(views).rest(lens, places) ** 2) + np.sum(ridge**2))
 
 
 def _system(lens: Lens, views: Sequence[BoardView], places: Array) -> tuple[Array, Array]:
     """Return residuals and the slopes of the projections by lens and places, all views stacked."""
-    count = len(FREE)
-    slopes = np.zeros((2 * sum(len(view.px) for view in views), count + 6 * len(views)))
-    rest, row = [], 0
-    for k, (view, place) in enumerate(zip(views, places, strict=True)):
-        end = row + 2 * len(view.px)
-        at = count + 6 * k
-        slopes[row:end, :count] = _lens_slopes(lens, view, place)
-        slopes[row:end, at : at + 6] = _place_slopes(lens, view, place)
-        rest.append(lens.residuals(view, place).ravel())
-        row = end
-    return np.concatenate(rest), slopes
-
-
-def _lens_slopes(lens: Lens, view: BoardView, place: Array) -> Array:
-    columns = []
-    for k in FREE:
+    corners, free, ridge = _Corners.of(views), FREE[lens.kind], RIDGE[lens.kind]
+    count = len(free)
+    rows = np.arange(2 * len(corners.px))
+    slopes = np.zeros((len(rows), count + 6 * len(views)))
+    for column, k in enumerate(free):
         step = STEP_RATIO * max(1.0, abs(float(lens.numbers[k])))
         ends = []
         for sign in (1.0, -1.0):
             numbers = lens.numbers.copy()
             numbers[k] += sign * step
-            ends.append(Lens(numbers, lens.fisheye).project(place, view.board_m))
-        columns.append((ends[0] - ends[1]).ravel() / (2.0 * step))
-    return np.column_stack(columns)
+            ends.append(corners.project(Lens(numbers, lens.fisheye), places))
+        slopes[:, column] = (ends[0] - ends[1]).ravel() / (2.0 * step)
+    for k in range(6):  # of all boards at once: a corner moves with its own alone
+        step_6 = np.zeros(6)
+        step_6[k] = STEP_RATIO
+        moved = corners.project(lens, places + step_6) - corners.project(lens, places - step_6)
+        slopes[rows, count + 6 * np.repeat(corners.view, 2) + k] = moved.ravel() / (2.0 * STEP_RATIO)
+    held = np.hstack((np.diag(ridge), np.zeros((count, 6 * len(views)))))
+    rest = np.concatenate((corners.rest(lens, places), -ridge * lens.numbers[free]))
+    return rest, np.vstack((slopes, held))
 
 
 def _place_slopes(lens: Lens, view: BoardView, place: Array) -> Array:
