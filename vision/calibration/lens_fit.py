@@ -31,7 +31,10 @@ KINDS: tuple[Kind, ...] = get_args(Kind)  # the plainer first
 FREE = {"fisheye": np.array([0, 1, 2, 3, 4, 5, 8]), "rational": np.arange(12)}
 # The terms of a quotient balance each other: where the corners leave them open they stay near 0,
 # as if each had been measured as 0 +- 1 beside corners of 0.1 px.
-RIDGE = {"fisheye": np.zeros(7), "rational": np.r_[np.zeros(4), 0.1, 0.1, 0.0, 0.0, np.full(4, 0.1)]}
+RIDGE = {
+    "fisheye": np.zeros(7),
+    "rational": np.r_[np.zeros(4), 0.1, 0.1, 0.0, 0.0, np.full(4, 0.1)],
+}
 STARTS_F_RATIO = (0.2, 0.3, 0.45, 0.7, 1.0, 1.6)  # focal lengths over the image's width
 START_VIEWS = 5
 STEPS_MAX = 40
@@ -204,7 +207,9 @@ class _Corners:
     def of(cls, views: Sequence[BoardView]) -> _Corners:
         counts = [len(view.px) for view in views]
         board_m = np.vstack([view.board_m for view in views])
-        return cls(board_m, np.vstack([v.px for v in views]), np.repeat(np.arange(len(views)), counts))
+        return cls(
+            board_m, np.vstack([v.px for v in views]), np.repeat(np.arange(len(views)), counts)
+        )
 
     def project(self, lens: Lens, places: Array) -> Array:
         """Return the pixels, (N, 2), of all corners, the boards being at their places, (V, 6)."""
@@ -240,7 +245,9 @@ def _system(lens: Lens, views: Sequence[BoardView], places: Array) -> tuple[Arra
         step_6 = np.zeros(6)
         step_6[k] = STEP_RATIO
         moved = corners.project(lens, places + step_6) - corners.project(lens, places - step_6)
-        slopes[rows, count + 6 * np.repeat(corners.view, 2) + k] = moved.ravel() / (2.0 * STEP_RATIO)
+        slopes[rows, count + 6 * np.repeat(corners.view, 2) + k] = moved.ravel() / (
+            2.0 * STEP_RATIO
+        )
     held = np.hstack((np.diag(ridge), np.zeros((count, 6 * len(views)))))
     rest = np.concatenate((corners.rest(lens, places), -ridge * lens.numbers[free]))
     return rest, np.vstack((slopes, held))
