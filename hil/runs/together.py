@@ -97,6 +97,7 @@ class _Company:
         self._sessions = sessions
         self._phases: list[Generator[Turn, int]] = []
         self._running: dict[int, Generator[Turn, int]] = {}
+        self._members: dict[int, Session] = {}
         self._native = _native.Together()
         self._asked: dict[int, _Batch] = {}
 
@@ -110,7 +111,7 @@ class _Company:
                 _obey(session)
                 continue
             place = self._native.add(turn.drive)
-            self._running[place] = self._phases[-1]
+            self._running[place], self._members[place] = self._phases[-1], session
             turns.append(turn)
             self._take(place, turn)
         self._ask(turns)
@@ -163,6 +164,7 @@ class _Company:
         except StopIteration:
             del self._running[place]
             self._native.end(place)
+            _obey(self._members[place])
         else:
             self._take(place, turn)
 

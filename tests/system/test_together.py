@@ -12,6 +12,7 @@ from hil.core.errors import BadInput, RigFault
 from hil.core.types import OuterCommand
 from hil.runs import together
 from hil.runs.execute import InMemory, execute_in_memory
+from hil.runs.intake import Intake
 from hil.runs.together import execute_together, run_together
 from tests.system.test_native_intake import CASES, ONE, differences, spec_of
 
@@ -125,6 +126,33 @@ def test_an_interruption_stops_all():
     for run in opened:
         assert run.session.ending.outcome == "interrupted"
         assert "stopped" in [event.kind for event in run.record().events]
+
+
+def test_an_interruption_that_a_session_meets_itself_stops_all(monkeypatch):
+    """Ctrl-C that comes while one run looks at a message of its board is for the others too."""
+    opened = []
+
+    def open_one(spec):
+        opened.append(InMemory(spec))
+        return opened[-1]
+
+    hear = Intake.hear
+
+    def pressed(self, pump):
+        session = opened[1].session if len(opened) == 3 else None
+        if session is not None and self is session._intake and session._t0_s:  # all have begun
+            raise KeyboardInterrupt("SIGINT")
+        return hear(self, pump)
+
+    monkeypatch.setattr(Intake, "hear", pressed)
+    told = spec_of(ONE | {"fault": "board_reset"})  # the board says so in the midst of its run
+    with pytest.raises(KeyboardInterrupt, match="SIGINT"):
+        run_together([partial(open_one, spec) for spec in (spec_of(ONE), told, spec_of(ONE))])
+    endings = [run.session.ending for run in opened]
+    assert [(ending.outcome, ending.detail) for ending in endings] == [
+        ("interrupted", "SIGINT")
+    ] * 3
+    assert opened[0].record().samples["t_s"].size > 1
 
 
 def test_the_comparison_sees_a_rig_moved_too_far(monkeypatch):
