@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -9,11 +10,13 @@ from hypothesis import strategies as st
 
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput, RigFault
+from hil.core.registries import OUTER_LAWS
 from hil.core.types import OuterCommand
 from hil.runs import together
 from hil.runs.execute import InMemory, execute_in_memory
 from hil.runs.intake import Intake
 from hil.runs.together import execute_together, run_together
+from tests.own.starts import written
 from tests.system.test_native_intake import CASES, ONE, differences, spec_of
 
 # What one of a company may be besides a case of its own: a run whose ticks or arrivals are Python's.
@@ -111,6 +114,47 @@ def test_what_a_law_raises_ends_its_own_run(error):
     else:
         assert found[1] is error
     require_same([spec, replace(spec, seed=9)], [found[0], found[2]])
+
+
+class Creeping:
+    """A law that goes faster and faster from its reset on."""
+
+    def reset(self, *_asked):
+        """Start anew."""
+        self._m_s = 0.0
+
+    def step(self, *_asked):
+        """Return a bit more each time."""
+        self._m_s = min(self._m_s + 1e-3, 0.05)
+        return OuterCommand(self._m_s, 0.0, {})
+
+
+def test_runs_that_were_given_one_law_follow_each_other(monkeypatch):
+    """A law object that several runs share starts anew for each of them, as where they are made alone."""
+    one = Creeping()
+    specs = [spec_of(ONE | {"seed": seed}) for seed in (3, 4, 5)]
+    makers = [partial(InMemory, spec, law=one) for spec in specs]
+    makers.insert(1, partial(InMemory, spec_of(ONE)))
+    found = run_together(makers)
+    alone = [execute_in_memory(spec, law=Creeping()) for spec in specs]
+    for record, expected in zip([found[0], *found[2:]], alone, strict=True):
+        assert differences(record, expected) == []
+    assert differences(found[1], execute_in_memory(spec_of(ONE))) == []
+    monkeypatch.setattr(together, "_companies", lambda runs: [runs])  # negative control
+    shared = run_together([partial(InMemory, spec, law=one) for spec in specs])
+    assert "samples.eta1_cmd_m_s" in differences(shared[0], alone[0])
+
+
+def test_a_factory_that_gives_one_law_again_and_again(tmp_path):
+    """What is put around a law, for holds and for axes of its own, hides it from nobody."""
+    lines = Path(__file__).read_text("utf-8").partition("class Creeping:")[2].partition("\n\n\n")[0]
+    text = "from hil.core.types import OuterCommand\nimport hil\n\n\nclass Creeping:" + lines
+    text += (
+        '\n\n\nONE = Creeping()\n\n\n@hil.outer_law("again")\ndef again(*_given):\n    return ONE\n'
+    )
+    outer = OUTER_LAWS.get(str(written(tmp_path / "again.py", text))).name
+    specs = [replace(spec_of(ONE | {"axes": axes}), outer=outer) for axes in (0.0, 0.7)]
+    require_same(specs, execute_together(specs))
 
 
 def test_an_interruption_stops_all():
