@@ -17,7 +17,7 @@ from tests.calibration.test_wide_lenses import LENS, SIZE, WIDE, held
 from tests.system.runs import run, scenario_with
 from tests.vision.scenes import at_rest, localiser
 from vision.calibration.boards import BoardView
-from vision.calibration.files import Table, lens_tables, read_camera, update_camera
+from vision.calibration.files import lens_tables, read_camera, update_camera
 from vision.calibration.intrinsics import calibrate_lens
 from vision.calibration.lens_fit import KINDS, fit_lens
 from vision.calibration.plausible import check_rational, named
@@ -140,23 +140,23 @@ def wide_camera():
 
 
 def test_the_twin_draws_and_the_marks_are_found_through_it():
-    """Ten places over the floor come back within 0.4 mm; read as a plain lens they are 5 mm off."""
+    """Ten places come back within 0.4 mm; read as a plain lens most are refused, the rest further off."""
     camera = wide_camera()
     finder = localiser(camera)
-    plain = camera.model_copy(update={"lens": LensConfig(**LENS_KEYS | {"k4": 0.0, "k5": 0.0})})
-    wrong = localiser(plain)
-    rng, off, misled = np.random.default_rng(3), [], []
+    plain = LensConfig(**LENS_KEYS | {"k4": 0.0, "k5": 0.0})
+    wrong = localiser(camera.model_copy(update={"lens": plain}))
+    rng, misled = np.random.default_rng(3), []
     for _ in range(10):
         pose = Pose(*rng.uniform((-0.7, -0.5, -3.0), (0.7, 0.5, 3.0)))
         image = at_rest(pose, camera)
-        seen = finder.locate(image)
-        assert seen.pose is not None
-        off.append(np.hypot(seen.pose.x_m - pose.x_m, seen.pose.y_m - pose.y_m))
-        other = wrong.locate(image)
-        if other.pose is not None:
-            misled.append(np.hypot(other.pose.x_m - pose.x_m, other.pose.y_m - pose.y_m))
-    assert max(off) < 0.4e-3
-    assert min(misled, default=1.0) > 5e-3
+        seen, other = (f.locate(image, pose, 0.06).pose for f in (finder, wrong))
+        assert seen is not None
+        off_m = np.hypot(seen.x_m - pose.x_m, seen.y_m - pose.y_m)
+        assert off_m < 0.4e-3
+        if other is not None:
+            misled.append(np.hypot(other.x_m - pose.x_m, other.y_m - pose.y_m) > 2.0 * off_m)
+    assert len(misled) <= 5
+    assert all(misled)
 
 
 def test_a_rational_lens_drives_a_rendered_run(tmp_path):

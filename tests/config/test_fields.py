@@ -21,8 +21,8 @@ from hil.report.assumptions import assumptions, gain_assumptions
 ALL = {(setting.key, setting.kind): setting for setting in settings(Scenario)}
 # Plain numbers: exponents, coefficients, counters and seeds; all others have a unit or are a share.
 PLAIN = {
-    "camera.lens.k1", "camera.lens.k2", "camera.lens.k3", "camera.lens.k4", "camera.lens.k5", "camera.lens.k6",
-    "camera.lens.p1", "camera.lens.p2",
+    "camera.lens.k1", "camera.lens.k2", "camera.lens.k3", "camera.lens.k4",
+    "camera.lens.k5", "camera.lens.k6", "camera.lens.p1", "camera.lens.p2",
     "camera.lens.shift_degree", "camera.pose.R_world_cam", "camera.robot_look.tag.tag_id",
     "camera.scene.texture_seed", "control.fusion.gate_chi2", "disturbances.*.seed",
     "disturbances.*.amplitude", "requirements.*.min", "requirements.*.max",

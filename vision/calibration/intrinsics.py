@@ -1,7 +1,6 @@
 """Lens calibration from views of a board: outlier views dropped by name, hold-out error, coverage.
 
-Whether the lens is a fisheye or a rational one is told by evidence: the error on views that it was
-not fitted to.
+Which kind of lens it is is told by evidence: the error on views that it was not fitted to.
 """
 
 from __future__ import annotations
@@ -42,8 +41,7 @@ OUTLIER_DEVIATIONS = 4.0
 OUTLIER_FACTOR = 2.0
 DROP_RATIO_MAX = 0.34
 JUDGED_MAX = 24
-# Another kind of lens than the plainer one is taken where its error on held-out views is less by this
-# factor and by so many pixels.
+# Another kind of lens than the plainer is taken where it misses held-out views less by this and so much.
 KIND_FACTOR = 1.15
 KIND_GAIN_PX = 0.02
 
@@ -78,7 +76,8 @@ class LensCalibration:
 
     `lens` is (fx, fy, cx, cy, k1, k2, p1, p2, k3), of a rational lens also k4, k5, k6, and `sigma`
     its standard deviations. `evidence_px` has the median view's error on held-out views for each of
-    KINDS, infinite where there is none, empty where it was not asked. `held_out_px` is the RMS residual over views the lens was not fitted to, their pose being solved anew.
+    KINDS, infinite where there is none, empty where it was not asked. `held_out_px` is the RMS
+    residual over views the lens was not fitted to, their pose being solved anew.
     `corners_px` and `residuals_px` (seen minus projected) are (N, 2), over all views kept.
     `alike` names views that show the board where another does, with that other one.
     """
@@ -118,10 +117,8 @@ def calibrate_lens(
     has, one whose focal length is uncertain, and one that misses views it was not fitted to.
     """
     differing, alike = _differing(views, size_px)
-    evidence_px: tuple[float, ...] = ()
-    if kind == "auto":
-        evidence_px = _evidence(differing, size_px)
-        kind = _told_kind(evidence_px)
+    evidence_px = _evidence(differing, size_px) if kind == "auto" else ()
+    kind = _told_kind(evidence_px) if kind == "auto" else kind
     kept, dropped, fit, left_out = _fit_without_outliers(differing, alike, size_px, kind)
     tilts = [_tilt_deg(place) for place in fit.places]
     check_lens(fit.lens.numbers, fit.sigma, size_px, tilts)
@@ -399,5 +396,4 @@ def sights(pairs: Sequence[tuple[BoardView, Array]], size_px: tuple[int, int]) -
 
 def _rms(errors: Array, views: Sequence[BoardView]) -> float:
     """Return the RMS over all corners of per-view RMS errors."""
-    weights = np.array([len(view.px) for view in views], dtype=np.float64)
-    return float(np.sqrt(np.average(np.square(errors), weights=weights)))
+    return float(np.sqrt(np.average(np.square(errors), weights=[len(view.px) for view in views])))

@@ -1,8 +1,8 @@
 """One lens fitted to views of a board: OpenCV's pinhole of five terms or rational of eight, or a fisheye.
 
 The fisheye is that of `vision.camera`, three terms of the ray's angle. It and the rational lens,
-which OpenCV's steps lead to poles within the image now and then, are fitted here by
-Levenberg and Marquardt over lens and board places, starting from the pinhole, or the best of some focal lengths:
+which OpenCV's steps lead to poles within the image now and then, are fitted here by Levenberg and
+Marquardt over lens and board places, starting from the pinhole, or the best of some focal lengths:
 `cv2.fisheye.calibrate` gives no standard deviations, gives up on good views now and then, and its
 settings moved between OpenCV 4 and 5.
 """

@@ -193,8 +193,8 @@ NB_MODULE(_marks, m) {
       .def(
           "__init__",
           [](Camera* self, const std::array<double, 4>& lens, const std::array<double, 5>& distortion,
-             const std::array<double, 9>& rotation, const std::array<double, 3>& centre_m,
-             bool fisheye, const std::array<double, 3>& below) {
+             const std::array<double, 9>& rotation, const std::array<double, 3>& centre_m, bool fisheye,
+             const std::array<double, 3>& below) {
             new (self) Camera{lens, distortion, rotation, centre_m, fisheye, below};
           },
           "lens"_a, "distortion"_a, "rotation"_a, "centre_m"_a, "fisheye"_a = false,
