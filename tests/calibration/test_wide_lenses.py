@@ -73,7 +73,7 @@ def test_the_slopes_of_a_fisheye_are_those_of_its_projection():
 def test_a_fisheye_is_told_by_held_out_views(tmp_path):
     """A lens of 134 degrees is found out, its figures come back, and the camera file holds it."""
     result = calibrate_lens(held(WIDE), SIZE)
-    pinhole_px, fisheye_px = result.evidence_px
+    pinhole_px, fisheye_px, _ = result.evidence_px
     assert result.fisheye
     assert fisheye_px < 0.25
     assert pinhole_px > 2.0 * fisheye_px
@@ -93,7 +93,7 @@ def test_an_ordinary_lens_stays_a_pinhole():
     views = held(LENS, 20)
     result = calibrate_lens(views, SIZE)
     assert not result.fisheye
-    assert len(result.evidence_px) == 2
+    assert len(result.evidence_px) == 3
     forced = calibrate_lens(views, SIZE, "fisheye")
     assert forced.fisheye
     assert forced.lens[0] == pytest.approx(LENS.fx_px, rel=0.02)
