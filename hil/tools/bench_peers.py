@@ -76,7 +76,8 @@ class Line:
     @classmethod
     def of_data(cls, data: Mapping[str, Any]) -> Line:
         """Return the line that `as_data` has written."""
-        return cls(**{name: math.nan if value is None else value for name, value in data.items()})
+        values: dict[str, Any] = {k: math.nan if v is None else v for k, v in data.items()}
+        return cls(**values)
 
 
 @dataclass(slots=True)

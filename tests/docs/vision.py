@@ -43,8 +43,8 @@ def empty(found: Empty) -> str:
         f" were accepted, and of {found.with_robot:,} with it among look-alikes {found.found:,} had its"
         f" pose and {found.wrong:,} another; in {len(found.taken_in)} scenes{named} there was a wrong one."
         f" With 95 % confidence that is less than {_share(frames)} of such frames, were each a draw of its"
-        f" own, and less than {_share(scenes)} of such scenes, which are. The goal, none in {GOAL_FRAMES:,} frames, is"
-        f" {'met' if found.frames >= GOAL_FRAMES and not found.accepted else 'not met'}.\n"
+        f" own, and less than {_share(scenes)} of such scenes, which are. The goal, none in"
+        f" {GOAL_FRAMES:,} frames, is {'met' if found.frames >= GOAL_FRAMES and not found.accepted else 'not met'}.\n"
     )
 
 

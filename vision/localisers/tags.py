@@ -229,7 +229,7 @@ class TagLocaliser:
         points = _into(square.pose, self._camera.floor_points(px, self._height_m))
         contrast_dn = float(np.median(contrast[good]))
         free_m = SIGMA_FREE_PX * self._scale_m_px(square.pose)
-        return _fit_square(square, points, normals[good], contrast_dn, free_m)
+        return _fit_square(square, points, np.flatnonzero(good), contrast_dn, free_m)
 
     def _pixels(self, pose: Pose, tag_m: Array) -> Array:
         c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
@@ -346,13 +346,14 @@ def _bilinear(level: Image, px: Array) -> Array:
 
 
 def _fit_square(
-    square: _Outline, points: Array, normals: Array, contrast_dn: float, free_m: float
+    square: _Outline, points: Array, edges: NDArray[np.intp], contrast_dn: float, free_m: float
 ) -> _Outline:
     """Return the square moved, turned and sized to edge points given in its own frame.
 
-    Distances to the sides are linear in (dx, dy, dtheta, dhalf); one pass leaves out points that
-    lie far from the first fit (something across the tag).
+    `edges` are their numbers, SAMPLES_PER_SIDE a side. Distances to the sides are linear in (dx, dy,
+    dtheta, dhalf); one pass leaves out points that lie far from the first fit (something across the tag).
     """
+    normals = NORMALS[edges // SAMPLES_PER_SIDE]
     lever = normals[:, 1] * points[:, 0] - normals[:, 0] * points[:, 1]
     A = np.column_stack((normals, lever, np.ones(len(points))))
     distance = np.sum(normals * points, axis=1) - 0.5 * square.side_m
@@ -370,8 +371,9 @@ def _fit_square(
         square.pose.x_m + c * dx - s * dy, square.pose.y_m + s * dx + c * dy, theta + dtheta
     )
     residual = float(np.sqrt(np.mean(rest[keep] ** 2)))
-    across = np.abs(normals[keep, 0]) > 0.5
-    claimed = covariance_m2(A[keep], rest[keep], across, free_m)
+    side, along = np.divmod(edges[keep], SAMPLES_PER_SIDE)
+    along = 2.0 * along / (SAMPLES_PER_SIDE - 1) - 1.0
+    claimed = covariance_m2(A[keep], rest[keep], side, along, free_m)
     side_m = square.side_m + 2.0 * dhalf
     return _Outline(pose, side_m, residual, int(keep.sum()), contrast_dn, claimed)
 
