@@ -37,6 +37,7 @@ def empty(found: Empty) -> str:
     """Return what scenes without the robot have shown, with what it says of all such scenes and frames."""
     frames = most_ratio(found.accepted, found.frames)
     scenes = most_ratio(len(found.taken_in), found.scenes)
+    goal = "met" if found.frames >= GOAL_FRAMES and not found.accepted else "not met"
     named = f" (numbers {', '.join(map(str, found.taken_in))})" if found.taken_in else ""
     return (
         f"Of {found.frames:,} frames without the robot, in {found.scenes:,} scenes, {found.accepted:,}"
@@ -44,7 +45,7 @@ def empty(found: Empty) -> str:
         f" pose and {found.wrong:,} another; in {len(found.taken_in)} scenes{named} there was a wrong one."
         f" With 95 % confidence that is less than {_share(frames)} of such frames, were each a draw of its"
         f" own, and less than {_share(scenes)} of such scenes, which are. The goal, none in"
-        f" {GOAL_FRAMES:,} frames, is {'met' if found.frames >= GOAL_FRAMES and not found.accepted else 'not met'}.\n"
+        f" {GOAL_FRAMES:,} frames, is {goal}.\n"
     )
 
 
