@@ -81,7 +81,7 @@ def command(
     judged on the other (docs/verdict.md). Without one, the result is judged on the same tasks with
     seeds no candidate has seen, which says nothing of other tasks.
 
-    The result is a gain set with its origin, judged at once, all laws under the same seeds. Some ten
+    The result is a gain set with its origin, judged at once, all laws under the same seeds. Some
     minutes of two cores; a search that is interrupted keeps its runs in FILE.search, and the same command
     goes on.
     """

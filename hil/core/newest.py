@@ -3,28 +3,65 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
-from typing import TypeVar
+from collections.abc import Callable, Iterator
+from typing import Any, TypeVar
 
 Given = TypeVar("Given")
 Found = TypeVar("Found")
+
+# Tables of an object, each with a copy of what it held.
+_Held = list[tuple[Any, Any]]
 
 
 def of_newest(function: Callable[[Given], Found]) -> Callable[[Given], Found]:
     """Return the function, asked anew only for another object than the call before.
 
-    The object is one that nobody changes, as sections of the configuration are. What the function raises is
-    not kept.
+    The object is a section of the configuration. Its fields stay; what its tables and lists hold may be
+    changed by whoever has it, in a notebook say, and the function is then asked anew. What it raises is not
+    kept.
     """
-    kept: list[tuple[Given, Found]] = []
+    kept: list[tuple[Given, _Held, Found]] = []
 
     @functools.wraps(function)
     def give(given: Given) -> Found:
-        for known, found in kept:
-            if known is given:
+        for known, held, found in kept:
+            if known is given and _hold(held):
                 return found
         found = function(given)
-        kept[:] = [(given, found)]
+        kept[:] = [(given, _held_by(given), found)]
         return found
 
     return give
+
+
+def _hold(held: _Held) -> bool:
+    """Say whether the tables hold what they held."""
+    return all(table == copy for table, copy in held)
+
+
+# What was looked through last: several functions are asked of one scenario, and of its robot.
+_seen: list[tuple[Any, _Held]] = []
+_MOST_SEEN = 2
+
+
+def _held_by(given: Any) -> _Held:
+    for known, held in _seen:
+        if known is given and _hold(held):
+            return held
+    held = [(table, table.copy()) for table in _tables(given)]
+    _seen[:] = [(given, held), *(one for one in _seen if one[0] is not given)][:_MOST_SEEN]
+    return held
+
+
+def _tables(value: Any) -> Iterator[Any]:
+    """Yield what can be changed in place: of a section, and in what that holds."""
+    if isinstance(value, dict | list):
+        yield value
+    if isinstance(value, dict):
+        value = tuple(value.values())
+    elif hasattr(type(value), "model_fields"):
+        value = tuple(vars(value).values())
+    if isinstance(value, tuple | list):
+        for item in value:
+            if not isinstance(item, float | str | int):
+                yield from _tables(item)

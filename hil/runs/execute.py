@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from hil.config.fit import board_parameters, check_fit
-from hil.control.laws.making import law_and_gains, make_law
+from hil.control.laws.making import law_and_gains, make_law, own_law
 from hil.core.registry import in_one_line
 from hil.record.memory import MemoryRecorder
 from hil.record.recorder import Recorder
@@ -157,6 +157,7 @@ class InMemory:
     def __init__(self, spec: RunSpec, rig: Rig | None = None, law: OuterLaw | None = None) -> None:
         parameters, self._used, manifest = checked(spec)
         law = law or make_law(spec.outer, spec.scenario)
+        self.own_law = own_law(law)
         self._rig = rig or open_rig(spec.target, spec.scenario, spec.camera, spec.seed, spec.key)
         try:
             self._recorder = MemoryRecorder(manifest)

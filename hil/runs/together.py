@@ -8,7 +8,8 @@ made by itself before. Whatever ends a run ends that run.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections import Counter
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -49,7 +50,8 @@ def run_together(makers: Sequence[Callable[[], InMemory]]) -> list[Result]:
                 found.append(make())
             except (Exception, SystemExit) as error:
                 found.append(error)
-        _to_their_ends([run.session for run in found if isinstance(run, InMemory)])
+        for company in _companies([run for run in found if isinstance(run, InMemory)]):
+            _to_their_ends([run.session for run in company])
         return [_record(run) if isinstance(run, InMemory) else run for run in found]
     finally:
         for run in found:
@@ -67,6 +69,19 @@ def figures_together(
             raise record
         done = record.manifest.outcome == "complete"
         found.append(record.figures().values if done else None)
+    return found
+
+
+def _companies(runs: Sequence[InMemory]) -> list[list[InMemory]]:
+    """Return who runs beside whom: never two of one law, which each of them starts anew."""
+    found: list[list[InMemory]] = []
+    taken: Counter[int] = Counter()
+    for run in runs:
+        law = id(run.own_law)
+        if taken[law] == len(found):
+            found.append([])
+        found[taken[law]].append(run)
+        taken[law] += 1
     return found
 
 
@@ -97,6 +112,7 @@ class _Company:
         self._sessions = sessions
         self._phases: list[Generator[Turn, int]] = []
         self._running: dict[int, Generator[Turn, int]] = {}
+        self._members: dict[int, Session] = {}
         self._native = _native.Together()
         self._asked: dict[int, _Batch] = {}
 
@@ -110,7 +126,7 @@ class _Company:
                 _obey(session)
                 continue
             place = self._native.add(turn.drive)
-            self._running[place] = self._phases[-1]
+            self._running[place], self._members[place] = self._phases[-1], session
             turns.append(turn)
             self._take(place, turn)
         self._ask(turns)
@@ -163,6 +179,7 @@ class _Company:
         except StopIteration:
             del self._running[place]
             self._native.end(place)
+            _obey(self._members[place])
         else:
             self._take(place, turn)
 
@@ -198,7 +215,7 @@ class _Batch:
         self._places = {key: place for place, key in enumerate(keys)}
         self._batch: GuardedBatch | None = None
 
-    def answer(self, places: Sequence[int]) -> dict[int, RigFault]:
+    def answer(self, places: Sequence[int]) -> Mapping[int, Exception | SystemExit]:
         """Answer for the runs at `places`, whose laws are asked; return what ends which of them."""
         where = np.array([self._at[place] for place in places], np.intp)
         laws = [self._asked[at].native for at in where.tolist()]
@@ -210,6 +227,8 @@ class _Batch:
             given, names, faults = self._batch.step(where, rows[:ROWS], reset)
         except RigFault as fault:
             return {place: RigFault(str(fault)) for place in places}
+        except (Exception, SystemExit) as error:  # of no run beside these
+            return dict.fromkeys(places, error)
         kept = [self._places[name] for name in names if name in self._places]
         if len(kept) < len(names):
             given = given[[0, 1, *(2 + i for i, name in enumerate(names) if name in self._places)]]

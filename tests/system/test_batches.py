@@ -110,6 +110,12 @@ def test_one_run_whose_command_may_not_be_sent_ends_alone(tmp_path: Path):
         ("short", "        return hil.CommandBatch(forward_m_s[:1][[0] * 9], turn)\n",
          "step_batch returned eta1_m_s = an array of shape (9,), 6 numbers are needed"),
         ("nothing", "        return None\n", "step_batch returned NoneType, a CommandBatch is needed"),
+        ("complex", "        return hil.CommandBatch(forward_m_s + 1j, turn)\n",
+         "step_batch returned eta1_m_s = an array of shape (6,), 6 numbers are needed"),
+        ("text", "        return hil.CommandBatch(forward_m_s.astype(str), turn)\n",
+         "step_batch returned eta1_m_s = an array of shape (6,), 6 numbers are needed"),
+        ("places", "        where[:] = 0\n        return hil.CommandBatch(forward_m_s, turn)\n",
+         "step_batch raised ValueError: assignment destination is read-only"),
     ],
 )  # fmt: skip
 def test_what_breaks_for_all_ends_all(what, bad, said, tmp_path: Path):
@@ -123,3 +129,14 @@ def test_what_breaks_for_all_ends_all(what, bad, said, tmp_path: Path):
         assert record.manifest.outcome_detail.endswith(said)
         assert "stopped" in [event.kind for event in record.events]
     assert found[-1].manifest.outcome == "complete"
+
+
+@pytest.mark.parametrize("error", ["SystemExit(5)", "hil.BadInput('no')"])
+def test_what_ends_more_than_a_run_ends_those_of_its_law(error, tmp_path: Path):
+    """What the law raises is what each run of it gives, as alone; the run beside them is whole."""
+    good = '        return hil.CommandBatch(forward_m_s, turn, {"abeam_m_s": abeam})\n'
+    outer = law_in(tmp_path, f"ends-{error[:3].lower()}", (good, f"        raise {error}\n"))
+    found = execute_together([*specs_of(outer)[:2], spec_of(ONE)])
+    assert [type(record).__name__ for record in found[:2]] == ["RigFault"] * 2
+    assert error.rpartition(".")[2].partition("(")[0] in str(found[0])
+    assert differences(found[2], execute_in_memory(spec_of(ONE))) == []

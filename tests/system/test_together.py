@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -9,10 +10,13 @@ from hypothesis import strategies as st
 
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput, RigFault
+from hil.core.registries import OUTER_LAWS
 from hil.core.types import OuterCommand
 from hil.runs import together
 from hil.runs.execute import InMemory, execute_in_memory
+from hil.runs.intake import Intake
 from hil.runs.together import execute_together, run_together
+from tests.own.starts import written
 from tests.system.test_native_intake import CASES, ONE, differences, spec_of
 
 # What one of a company may be besides a case of its own: a run whose ticks or arrivals are Python's.
@@ -112,6 +116,47 @@ def test_what_a_law_raises_ends_its_own_run(error):
     require_same([spec, replace(spec, seed=9)], [found[0], found[2]])
 
 
+class Creeping:
+    """A law that goes faster and faster from its reset on."""
+
+    def reset(self, *_asked):
+        """Start anew."""
+        self._m_s = 0.0
+
+    def step(self, *_asked):
+        """Return a bit more each time."""
+        self._m_s = min(self._m_s + 1e-3, 0.05)
+        return OuterCommand(self._m_s, 0.0, {})
+
+
+def test_runs_that_were_given_one_law_follow_each_other(monkeypatch):
+    """A law object that several runs share starts anew for each of them, as where they are made alone."""
+    one = Creeping()
+    specs = [spec_of(ONE | {"seed": seed}) for seed in (3, 4, 5)]
+    makers = [partial(InMemory, spec, law=one) for spec in specs]
+    makers.insert(1, partial(InMemory, spec_of(ONE)))
+    found = run_together(makers)
+    alone = [execute_in_memory(spec, law=Creeping()) for spec in specs]
+    for record, expected in zip([found[0], *found[2:]], alone, strict=True):
+        assert differences(record, expected) == []
+    assert differences(found[1], execute_in_memory(spec_of(ONE))) == []
+    monkeypatch.setattr(together, "_companies", lambda runs: [runs])  # negative control
+    shared = run_together([partial(InMemory, spec, law=one) for spec in specs])
+    assert "samples.eta1_cmd_m_s" in differences(shared[0], alone[0])
+
+
+def test_a_factory_that_gives_one_law_again_and_again(tmp_path):
+    """What is put around a law, for holds and for axes of its own, hides it from nobody."""
+    lines = Path(__file__).read_text("utf-8").partition("class Creeping:")[2].partition("\n\n\n")[0]
+    text = "from hil.core.types import OuterCommand\nimport hil\n\n\nclass Creeping:" + lines
+    text += (
+        '\n\n\nONE = Creeping()\n\n\n@hil.outer_law("again")\ndef again(*_given):\n    return ONE\n'
+    )
+    outer = OUTER_LAWS.get(str(written(tmp_path / "again.py", text))).name
+    specs = [replace(spec_of(ONE | {"axes": axes}), outer=outer) for axes in (0.0, 0.7)]
+    require_same(specs, execute_together(specs))
+
+
 def test_an_interruption_stops_all():
     """Ctrl-C in one run stops every robot, and is told once all have stopped."""
     opened = []
@@ -125,6 +170,33 @@ def test_an_interruption_stops_all():
     for run in opened:
         assert run.session.ending.outcome == "interrupted"
         assert "stopped" in [event.kind for event in run.record().events]
+
+
+def test_an_interruption_that_a_session_meets_itself_stops_all(monkeypatch):
+    """Ctrl-C that comes while one run looks at a message of its board is for the others too."""
+    opened = []
+
+    def open_one(spec):
+        opened.append(InMemory(spec))
+        return opened[-1]
+
+    hear = Intake.hear
+
+    def pressed(self, pump):
+        session = opened[1].session if len(opened) == 3 else None
+        if session is not None and self is session._intake and session._t0_s:  # all have begun
+            raise KeyboardInterrupt("SIGINT")
+        return hear(self, pump)
+
+    monkeypatch.setattr(Intake, "hear", pressed)
+    told = spec_of(ONE | {"fault": "board_reset"})  # the board says so in the midst of its run
+    with pytest.raises(KeyboardInterrupt, match="SIGINT"):
+        run_together([partial(open_one, spec) for spec in (spec_of(ONE), told, spec_of(ONE))])
+    endings = [run.session.ending for run in opened]
+    assert [(ending.outcome, ending.detail) for ending in endings] == [
+        ("interrupted", "SIGINT")
+    ] * 3
+    assert opened[0].record().samples["t_s"].size > 1
 
 
 def test_the_comparison_sees_a_rig_moved_too_far(monkeypatch):

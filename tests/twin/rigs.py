@@ -15,6 +15,7 @@ from hil.core.types import Pose
 from hil.wire import handshake
 from hil.wire.link import BoardLink, WheelReport
 from sim_twin import _native
+from sim_twin.camera_faults import FrameMaker
 from sim_twin.setup import plant_params
 from sim_twin.twin import Twin, TwinSetup
 
@@ -92,11 +93,12 @@ class Drive:
         start: Pose = Pose(0.0, 0.0, 0.0),  # noqa: B008
         disturbances: tuple[Disturbance, ...] = (),
         faults: tuple[Fault, ...] = (),
+        maker: FrameMaker | None = None,
     ) -> None:
         setup = TwinSetup(
             config or robot(), link, CameraConfig(), start, seed, disturbances, faults
         )
-        self.twin = Twin(setup)
+        self.twin = Twin(setup, maker)
         self.link = BoardLink(self.twin.stream)
         self.reports: list[WheelReport] = []
 

@@ -58,6 +58,11 @@ class GuardedLaw:
         return OuterCommand(float(command.eta1_m_s), float(command.theta_dot_rad_s), command.trace)
 
     @property
+    def own(self) -> object:
+        """The law itself, as its factory gave it."""
+        return self._law
+
+    @property
     def makes_batches(self) -> bool:
         """Say whether the law's class can step several runs at once (hil.core.batch)."""
         return callable(getattr(type(self._law), "batch", None))

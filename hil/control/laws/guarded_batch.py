@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from hil.core.errors import RigFault
 
 _SPEEDS = ("eta1_m_s", "theta_dot_rad_s")
+_NUMBERS = "fiub"  # kinds of numpy's that are numbers: no complex ones, texts or dates
 
 
 class GuardedBatch:
@@ -46,6 +47,7 @@ class GuardedBatch:
         RigFault for all.
         """
         guard = self._laws[0]
+        where.setflags(write=False)  # as the rest of what is asked
         reference, estimate, dt_s = asked(rows)
         if reset.any():
             anew = asked(rows[:, reset])[:2]
@@ -73,7 +75,10 @@ class GuardedBatch:
     def _fill(self, row: Array, name: str, values: object) -> None:
         """Take one number a run; one number alone stands for all."""
         try:
-            row[:] = values  # type: ignore[call-overload]  # whatever it is
+            given = np.asarray(values)
+            if given.dtype.kind not in _NUMBERS:
+                raise TypeError
+            row[:] = given
         except (TypeError, ValueError):
             shape = getattr(values, "shape", None)
             said = f"an array of shape {shape}" if shape is not None else repr(values)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from hil.control.laws.axes import TurnedAxes
 from hil.control.laws.guard import GuardedLaw
 from hil.control.laws.hold import HoldAtGoal
 from hil.control.laws.retuned import RetunedLaw
@@ -30,6 +31,14 @@ def law_and_gains(
     """Return the outer law of a run, and what changes its gains where they are `live`; raises as above."""
     control, d0_m = scenario.control, scenario.robot.d0_m
     return _ready(OUTER_LAWS.get(outer), control.active_gains, control.limits, d0_m, live=live)
+
+
+def own_law(law: OuterLaw) -> object:
+    """Return what a law's factory gave, without what was put around it; two runs may have been given one."""
+    inner: object = law
+    while isinstance(inner, HoldAtGoal | TurnedAxes):
+        inner = inner._law
+    return inner.own if isinstance(inner, GuardedLaw) else inner
 
 
 def make_outer_law(name: str, gains: Gains, limits: OuterLimits, d0_m: float) -> OuterLaw:
