@@ -2,22 +2,31 @@
 
 `python -m tests.docs.vision FILE...` takes what `hil bench vision --json` has printed, and what pieces of it
 (`--scenes`) have, keeps that in tests/data/vision_bench.json and writes the lines between the page's marks;
-without a file it draws what is kept.
+without a file it draws what is kept. `--page` takes what `hil bench vision --page` has written and puts its
+pictures together in docs/vision-worst.webp.
 """
 
 from __future__ import annotations
 
 import argparse
+import base64
+import html
 import json
+import re
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+
+import cv2
+import numpy as np
 
 from hil.tools.bench_peers import Line, as_markdown
 from hil.tools.look_alikes import Empty, most_ratio, together
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE, KEPT = ROOT / "docs" / "vision.md", ROOT / "tests" / "data" / "vision_bench.json"
+WORST = ROOT / "docs" / "vision-worst.webp"
+COLUMNS, PICTURE_PX, WORDS_PX = 5, (288, 144), 18
 GOAL_FRAMES = 100_000
 END = "<!-- figures: end -->\n"
 
@@ -83,11 +92,34 @@ def kept(files: list[Path]) -> dict[str, Any]:
     return {"peers": lines[-1], "empty_scenes": asdict(together(pieces))}
 
 
+def worst(page: str) -> bytes:
+    """Return the pictures of a page of the bench side by side, packed as WebP, each over its words."""
+    found = re.findall(r"base64,([^']+)'><figcaption>([^<]+)<", page)
+    cells = [_cell(base64.b64decode(packed), html.unescape(words)) for packed, words in found]
+    cells += [np.full_like(cells[0], 255)] * (-len(cells) % COLUMNS)
+    rows = [np.hstack(cells[k : k + COLUMNS]) for k in range(0, len(cells), COLUMNS)]
+    _, packed = cv2.imencode(".webp", np.vstack(rows), [cv2.IMWRITE_WEBP_QUALITY, 80])
+    return packed.tobytes()
+
+
+def _cell(packed: bytes, words: str) -> Any:
+    image = cv2.imdecode(np.frombuffer(packed, np.uint8), cv2.IMREAD_COLOR)
+    image = cv2.resize(image, PICTURE_PX, interpolation=cv2.INTER_AREA)
+    image = cv2.copyMakeBorder(image, 0, WORDS_PX, 0, 4, cv2.BORDER_CONSTANT, value=(255, 255, 255))
+    short = words.replace(", coloured floor", ", colours").replace(" claimed", "")
+    at = (2, PICTURE_PX[1] + WORDS_PX - 6)
+    return cv2.putText(image, short, at, cv2.FONT_HERSHEY_SIMPLEX, 0.33, (0, 0, 0), 1, cv2.LINE_AA)
+
+
 def main() -> None:
     """Keep what was measured, then draw."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("files", nargs="*", type=Path)
-    files = options.parse_args().files
+    options.add_argument("--page", type=Path)
+    asked = options.parse_args()
+    files = asked.files
+    if asked.page is not None:
+        WORST.write_bytes(worst(asked.page.read_text(encoding="utf-8")))
     if files:
         text = json.dumps(kept(files), indent=1, allow_nan=False)
         KEPT.write_text(f"{text}\n", encoding="utf-8")
