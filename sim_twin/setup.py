@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from hil.control.vehicles.vehicle import make_vehicle
 from hil.core.newest import of_newest
+from hil.core.registries import VEHICLES
 from sim_twin import _native
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ def plant_params(robot: RobotConfig) -> _native.PlantParams:
     return params
 
 
-_plant_params = of_newest(plant_params)
+_plant_params = of_newest(plant_params, by=lambda robot: VEHICLES.get(robot.vehicle.kind).factory)
 
 
 def make_kernel(

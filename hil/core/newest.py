@@ -13,22 +13,25 @@ Found = TypeVar("Found")
 _Held = list[tuple[Any, Any]]
 
 
-def of_newest(function: Callable[[Given], Found]) -> Callable[[Given], Found]:
+def of_newest(
+    function: Callable[[Given], Found], by: Callable[[Given], object] = lambda _given: None
+) -> Callable[[Given], Found]:
     """Return the function, asked anew only for another object than the call before.
 
     The object is a section of the configuration. Its fields stay; what its tables and lists hold may be
-    changed by whoever has it, in a notebook say, and the function is then asked anew. What it raises is not
-    kept.
+    changed by whoever has it, in a notebook say, and the function is then asked anew. So it is where `by`
+    gives another object: what a registry has under a name in the section. What is raised is not kept.
     """
-    kept: list[tuple[Given, _Held, Found]] = []
+    kept: list[tuple[Given, object, _Held, Found]] = []
 
     @functools.wraps(function)
     def give(given: Given) -> Found:
-        for known, held, found in kept:
-            if known is given and _hold(held):
+        made_by = by(given)
+        for known, maker, held, found in kept:
+            if known is given and maker is made_by and _hold(held):
                 return found
         found = function(given)
-        kept[:] = [(given, _held_by(given), found)]
+        kept[:] = [(given, made_by, _held_by(given), found)]
         return found
 
     return give

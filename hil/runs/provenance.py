@@ -84,7 +84,7 @@ def make_manifest(spec: RunSpec, parameters: Mapping[str, float], used: Used) ->
     )
 
 
-_notes = of_newest(notes)
+_notes = of_newest(notes, by=lambda scenario: REFERENCES.get(scenario.reference.kind).factory)
 
 
 @of_newest

@@ -1,10 +1,15 @@
 """What is kept of a scenario from run to run is found anew once somebody changes what the scenario holds."""
 
+from dataclasses import replace
+
 import pytest
 
+from hil.config.load import load_scenario
 from hil.core.errors import BadInput
 from hil.core.newest import of_newest
+from hil.core.registries import VEHICLES
 from hil.runs.execute import execute_in_memory
+from tests.own.starts import written
 from tests.system.test_native_intake import ONE, differences, spec_of
 
 
@@ -49,3 +54,33 @@ def test_what_is_unchanged_is_asked_once():
     assert len(calls) == 2
     ask(scenario.model_copy())
     assert len(calls) == 3
+
+
+VEHICLE = """
+import hil
+
+
+class Long(hil.VehicleConfig):
+    kind: str = "long"
+
+
+@hil.vehicle("long", settings=Long)
+class LongVehicle(hil.TwoSided):
+    def __init__(self, robot):
+        super().__init__(robot)
+        self.contacts = hil.Contacts(robot.front_axle_m, {times} * robot.rear_axle_m)
+"""
+
+
+def test_a_vehicle_that_is_registered_anew_is_what_moves(tmp_path):
+    """The robot's section is the same object, the code that its name stands for is not."""
+    file = written(tmp_path / "long.py", VEHICLE.format(times="1.0"))
+    given = [f"robot.vehicle={{kind={str(file)!r}}}", "robot.variant=slip", "duration_s=2"]
+    spec = replace(spec_of(ONE), scenario=load_scenario("circle", given))
+    before = execute_in_memory(spec)
+    written(file, VEHICLE.format(times="0.4"))
+    VEHICLES.get(str(file))
+    after = execute_in_memory(spec)
+    fresh = replace(spec, scenario=load_scenario("circle", given))
+    assert differences(after, execute_in_memory(fresh)) == []
+    assert "samples.true_x_m" in differences(after, before)
