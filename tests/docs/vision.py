@@ -47,11 +47,12 @@ def empty(found: Empty) -> str:
     frames = most_ratio(found.accepted, found.frames)
     scenes = most_ratio(len(found.taken_in), found.scenes)
     goal = "met" if found.frames >= GOAL_FRAMES and not found.accepted else "not met"
-    named = f" (numbers {', '.join(map(str, found.taken_in))})" if found.taken_in else ""
+    named = f" (scene {', '.join(map(str, found.taken_in))})" if found.taken_in else ""
     return (
         f"Of {found.frames:,} frames without the robot, in {found.scenes:,} scenes, {found.accepted:,}"
         f" were accepted, and of {found.with_robot:,} with it among look-alikes {found.found:,} had its"
-        f" pose and {found.wrong:,} another; in {len(found.taken_in)} scenes{named} there was a wrong one."
+        f" pose and {found.wrong:,} another. Scenes in which something else was taken for it:"
+        f" {len(found.taken_in)}{named}."
         f" With 95 % confidence that is less than {_share(frames)} of such frames, were each a draw of its"
         f" own, and less than {_share(scenes)} of such scenes, which are. The goal, none in"
         f" {GOAL_FRAMES:,} frames, is {goal}.\n"
