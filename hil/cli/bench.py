@@ -38,6 +38,9 @@ _SPEED = ("speed", "parts", "batch", "law", "campaign", "report")
               help="vision: frames of each condition that marks, tags and peers are shown.")  # fmt: skip
 @click.option("--empty", type=click.IntRange(1, 1_000_000), default=10_000, show_default=True,
               help="vision: frames without the robot, full of things like it.")  # fmt: skip
+@click.option("--scenes", metavar="FROM..TO",
+              help="vision: only the frames without the robot, those of these scenes (50 each), so that "
+              "a long run can be made in pieces.")  # fmt: skip
 @click.option("--longest", type=click.IntRange(10, 36_000), default=3_600, show_default=True,
               help="growth: runs up to so many seconds.")  # fmt: skip
 @click.option("--most-rows", type=click.IntRange(10, 1_000_000), default=100_000, show_default=True,
@@ -47,7 +50,8 @@ _SPEED = ("speed", "parts", "batch", "law", "campaign", "report")
 @json_option
 def command(
     what: str, runs: int, candidates: int | None, against: Path | None, page: Path | None,
-    frames: int, empty: int, longest: int, most_rows: int, plot: Path | None, as_json: bool,
+    frames: int, empty: int, scenes: str | None, longest: int, most_rows: int, plot: Path | None,
+    as_json: bool,
 ) -> None:  # fmt: skip
     """Measure the speed of the harness, or compare the wheel laws of the board.
 
@@ -74,12 +78,14 @@ def command(
         raise click.UsageError(f"--against: for {', '.join(_SPEED)}")
     if plot is not None and (what != "growth" or not plot.absolute().parent.is_dir()):
         raise click.UsageError(f"--plot {plot}: for growth, in a folder that exists")
+    if scenes is not None and (what != "vision" or page is not None):
+        raise click.UsageError("--scenes: for vision, without --page, whose frames have the robot")
     if candidates is not None:
         _tune_wheels(candidates, runs, as_json)
     elif what == "wheels":
         _compare_wheels(runs, as_json)
     elif what == "vision":
-        _measure_vision(frames, empty, page, as_json)
+        _measure_vision(frames, empty, scenes, page, as_json)
     elif what == "firmware":
         _measure_firmware(as_json)
     elif what == "growth":
@@ -88,9 +94,12 @@ def command(
         _measure_speed(what, runs, against, as_json)
 
 
-def _measure_vision(frames: int, without: int, page: Path | None, as_json: bool) -> None:
-    from dataclasses import asdict
-
+def _measure_vision(
+    frames: int, without: int, scenes: str | None, page: Path | None, as_json: bool
+) -> None:
+    if scenes is not None:
+        _show_scenes(scenes, as_json)
+        return
     from hil.core.files import replace_file
     from hil.tools import bench_peers, bench_vision, look_alikes
 
@@ -106,10 +115,34 @@ def _measure_vision(frames: int, without: int, page: Path | None, as_json: bool)
         replace_file(page, text.encode("utf-8"))
     if as_json:
         document = bench_vision.as_document(rows, empty)
-        print_json({**document, "peers": [asdict(line) for line in peers]})
+        print_json({**document, "peers": [line.as_data() for line in peers]})
         return
     click.echo(bench_vision.as_markdown(rows, empty))
     click.echo("\n" + bench_peers.as_markdown(peers))
+
+
+def _show_scenes(asked: str, as_json: bool) -> None:
+    from dataclasses import asdict
+
+    from hil.tools import bench_vision, look_alikes
+
+    first, last = _range(asked)
+    per_scene, views = look_alikes.FRAMES_PER_SCENE, tuple(bench_vision.VIEWS.values())
+    found = look_alikes.empty_scenes(
+        (last - first + 1) * per_scene, views, lambda text: click.echo(text, err=True), first=first
+    )
+    if as_json:
+        print_json({"empty_scenes": asdict(found)})
+    else:
+        click.echo(bench_vision.in_words(found))
+
+
+def _range(asked: str) -> tuple[int, int]:
+    """Return the first and the last number of FROM..TO."""
+    ends = asked.split("..")
+    if len(ends) != 2 or not all(end.isdecimal() for end in ends) or int(ends[0]) > int(ends[1]):
+        raise click.UsageError(f"--scenes {asked}: two numbers from 0 up, say 0..199")
+    return int(ends[0]), int(ends[1])
 
 
 def _measure_growth(longest_s: int, most_rows: int, plot: Path | None, as_json: bool) -> None:

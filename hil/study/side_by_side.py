@@ -20,7 +20,7 @@ from hil.record.reader import altered_files
 from hil.rigs.opening import is_simulated
 from hil.runs.execute import RunSpec
 from hil.study.work_folder import set_aside
-from hil.study.workers import submit, when_parent_is_gone
+from hil.study.workers import submit, take_ctrl_c, when_parent_is_gone
 
 if TYPE_CHECKING:
     from multiprocessing.queues import Queue
@@ -144,8 +144,16 @@ def _start_worker(news: Queue[tuple[str, float]], stop: Event) -> None:
     for name in ("SIGTERM", "SIGHUP"):  # the parent passes them on by `stop`
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
+    take_ctrl_c(_on_ctrl_c)
     when_parent_is_gone(_stop_run)
     threading.Thread(target=_stop_when_told, args=(stop,), daemon=True).start()
+
+
+def _on_ctrl_c(_number: int, _frame: object) -> None:
+    """Stop the run there is; between two of them no other is begun."""
+    _interrupted.set()
+    if not _idle.is_set():
+        raise KeyboardInterrupt
 
 
 def _stop_when_told(stop: Event) -> None:

@@ -12,6 +12,8 @@ import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from multiprocessing.process import BaseProcess
 from typing import Any, Generic, TypeVar
 
@@ -56,17 +58,39 @@ def submit(
 ) -> Future[Result]:
     """Hand a job to a pool; a signal that comes meanwhile is obeyed after that.
 
-    A pool starts its workers as jobs come. One whose start is broken off would tell of that by a traceback.
+    A pool starts its workers as jobs come. One whose start is broken off would tell of that by a traceback:
+    here, and in the worker itself, which Ctrl-C in a terminal reaches too; it waits there for `take_ctrl_c`.
     """
-    with CtrlC() as later:
+    resource_tracker.ensure_running()  # begins a process with a mask of its own, and undoes this one
+    with CtrlC() as later, _ctrl_c_held():
         future = pool.submit(function, job)
     later.obey()
     return future
 
 
+@contextmanager
+def _ctrl_c_held() -> Iterator[None]:
+    """Hold Ctrl-C back from this thread, and from the processes it begins, where the system can."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def take_ctrl_c(handler: Any) -> None:
+    """Set in a worker what Ctrl-C does there from now on."""
+    signal.signal(signal.SIGINT, handler)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
 def leave_ctrl_c_to_parent() -> None:
     """Set a worker up whose jobs are short and leave nothing: it ends at once with its parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    take_ctrl_c(signal.SIG_IGN)
     when_parent_is_gone(lambda: None)
 
 

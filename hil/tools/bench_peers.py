@@ -12,8 +12,8 @@ import html
 import math
 import statistics
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from typing import Any
 
@@ -65,6 +65,19 @@ class Line:
     slope: float
     nees: float
     median_ms: float
+
+    def as_data(self) -> dict[str, str | int | float | None]:
+        """Return the line for JSON, which has no NaN: null there."""
+        return {
+            name: None if isinstance(value, float) and math.isnan(value) else value
+            for name, value in asdict(self).items()
+        }
+
+    @classmethod
+    def of_data(cls, data: Mapping[str, Any]) -> Line:
+        """Return the line that `as_data` has written."""
+        values: dict[str, Any] = {k: math.nan if v is None else v for k, v in data.items()}
+        return cls(**values)
 
 
 @dataclass(slots=True)

@@ -198,12 +198,19 @@ def as_markdown(rows: list[Row], empty: Empty) -> str:
         f" | {r.tracking_ms:.2f} | {r.acquisition_ms:.1f} |"
         for r in rows
     ]
-    lines.append(
-        f"\nWithout the robot: {empty.accepted} of {empty.frames} frames accepted, in"
+    return "\n".join([*lines, "", in_words(empty)])
+
+
+def in_words(empty: Empty) -> str:
+    """Return what scenes without the robot have shown, in a sentence, and which scenes were taken for it."""
+    text = (
+        f"Without the robot: {empty.accepted} of {empty.frames} frames accepted, in"
         f" {empty.scenes} scenes of coloured things and look-alikes; beside them the robot was found in"
         f" {empty.found} of {empty.with_robot}, wrongly in {empty.wrong}."
     )
-    return "\n".join(lines)
+    if empty.taken_in:
+        text += f" Taken for it, or beside it, in scenes {', '.join(map(str, empty.taken_in))}."
+    return text
 
 
 def as_document(rows: list[Row], empty: Empty) -> dict[str, Any]:

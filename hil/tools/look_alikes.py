@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from random import Random
 from typing import Literal
@@ -48,7 +48,8 @@ class Empty:
 
     `accepted` of `frames` without the robot had a pose; of `with_robot` frames `found` had the
     robot's and `wrong` another. Where a second robot stands and nobody said which is ours, `wrong` is
-    every pose. `accepted_by` counts the look-alikes of the scenes in which one was taken for it.
+    every pose. `accepted_by` counts the look-alikes of the scenes in which one was taken for it, and
+    `taken_in` has the numbers of these scenes, to be looked at.
     """
 
     scenes: int
@@ -58,6 +59,7 @@ class Empty:
     found: int = 0
     wrong: int = 0
     accepted_by: tuple[tuple[str, int], ...] = ()
+    taken_in: tuple[int, ...] = ()
 
 
 @dataclass(slots=True)
@@ -139,28 +141,54 @@ def empty_scenes(
     progress: Progress | None = None,
     seed: int = 20,
     per_scene: int = FRAMES_PER_SCENE,
+    first: int = 0,
 ) -> Empty:
     """Return how often a robot is seen where there is none, or elsewhere than it stands.
 
     Scenes, of `per_scene` frames without the robot, have one kind of look-alike after the other, seen
-    in the first of `views`, then in the next.
+    in the first of `views`, then in the next. From scene `first` on they are those that a call from the
+    start would show: a long one can be made in pieces, whose counts add up (`together`).
     """
     rng = Random(seed)
     scenes = math.ceil(frames / per_scene)
-    count, by = _Count(), Counter[str]()
-    for scene in range(scenes):
-        if progress is not None:
-            progress(f"empty scene {scene + 1} of {scenes}")
+    count, by, taken = _Count(), Counter[str](), []
+    for scene in range(first + scenes):
         kind = KINDS[scene % len(KINDS)]
+        if scene < first:
+            _place(rng, clutter(rng, kind))
+            continue
+        if progress is not None:
+            progress(f"empty scene {scene - first + 1} of {scenes}")
         before = count.accepted + count.wrong
         few = min(per_scene, frames - count.frames)
         _show(rng, kind, views[scene // len(KINDS) % len(views)], scene, few, count)
         if count.accepted + count.wrong > before:
             by[kind] += count.accepted + count.wrong - before
+            taken.append(scene)
     return Empty(
         scenes, count.frames, count.accepted, count.with_robot, count.found, count.wrong,
-        tuple(by.items()),
+        tuple(by.items()), tuple(taken),
     )  # fmt: skip
+
+
+def together(pieces: Sequence[Empty]) -> Empty:
+    """Return what pieces of one long run, each with scenes of its own, have shown in all."""
+    by = Counter[str]()
+    for piece in pieces:
+        by.update(dict(piece.accepted_by))
+    names = ("scenes", "frames", "accepted", "with_robot", "found", "wrong")
+    return Empty(
+        **{name: sum(getattr(piece, name) for piece in pieces) for name in names},
+        accepted_by=tuple(by.items()),
+        taken_in=tuple(sorted(scene for piece in pieces for scene in piece.taken_in)),
+    )
+
+
+def most_ratio(events: int, tried: int) -> float:
+    """Return the upper end of the one-sided 95 % interval of a share (Clopper and Pearson 1934)."""
+    from scipy import stats  # noqa: PLC0415 - takes a second, and few ask
+
+    return 1.0 if events >= tried else float(stats.beta.ppf(0.95, events + 1, tried - events))
 
 
 def _show(

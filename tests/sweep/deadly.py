@@ -44,3 +44,9 @@ class Counts:
     def many(self, jobs: Sequence[int]) -> list[tuple[int, int]]:
         """Return them."""
         return [(job, len(jobs)) for job in jobs]
+
+
+def ctrl_c(_job: int) -> tuple[bool, bool]:
+    """Return whether Ctrl-C is held back from this process, and whether it is ignored here."""
+    held = signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    return held, signal.getsignal(signal.SIGINT) is signal.SIG_IGN

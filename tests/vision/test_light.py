@@ -12,6 +12,7 @@ from hil.config.camera import CameraConfig, SceneConfig
 from hil.core.types import Pose
 from hil.tools import bench_vision, look_alikes
 from hil.tools import vision_conditions as bench
+from tests.cli.command import hil
 from tests.vision.scenes import errors, localiser, rendered
 from vision.tracker import Tracker
 
@@ -81,3 +82,25 @@ def test_the_look_alikes_are_like_it():
     assert math.hypot(*errors(seen["second robot"].pose, pose)[:2]) < 1e-3
     assert seen["square"].pose is None
     assert re.search("rim off by|four corners", seen["square"].reason)
+
+
+def test_scenes_can_be_shown_in_pieces():
+    """Scenes 2 and 3 alone are drawn as in a run from the start; shown without their pictures."""
+    views = tuple(bench_vision.VIEWS.values())
+    drawn = {}
+
+    def show(name, frames, first):
+        def keep(rng, kind, _view, scene, _few, _count):
+            things = look_alikes.clutter(rng, kind)
+            drawn.setdefault(name, {})[scene] = (things, look_alikes._place(rng, things))
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(look_alikes, "_show", keep)
+            look_alikes.empty_scenes(frames, views, first=first, per_scene=1)
+
+    show("whole", 4, 0)
+    show("piece", 2, 2)
+    assert list(drawn["piece"]) == [2, 3]
+    assert drawn["piece"][3] == drawn["whole"][3] != drawn["whole"][2]
+    for asked in ("5..4", "5", "-1..2"):
+        assert "--scenes" in hil("bench", "vision", "--scenes", asked).refusal

@@ -23,6 +23,7 @@ from hil.core.wording import past
 from vision.camera import CameraModel, longest_px
 from vision.camera_setup import camera_model
 from vision.pose_fit import fit_pose
+from vision.tag_claim import covariance_m2, of_body
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -43,8 +44,7 @@ SIDE_TOLERANCE = 0.08
 CONTRAST_MIN_DN = 15.0
 RESIDUAL_MAX_PX = 0.8
 POINTS_MIN = 40
-SIGMA_MIN_PX = 0.02
-SIGMA_HEIGHT_M = 0.002
+SIGMA_FREE_PX = 0.02
 QUALITY_RESIDUAL_PX = 0.3
 QUALITY_CONTRAST_DN = 80.0
 IN_VIEW = "in view"  # how the reason ends where there are too many
@@ -59,6 +59,7 @@ class _Outline:
     residual_m: float
     points: int
     contrast_dn: float
+    covariance_m2: Array  # of (dx, dy, dtheta), (3, 3), in its own frame
 
 
 class TagLocaliser:
@@ -72,7 +73,8 @@ class TagLocaliser:
         self._height_m = height_m
         middle = camera.floor_point(0.5 * camera.width_px, 0.5 * camera.height_px, height_m)
         self._middle = Pose(*middle, 0.0)
-        cv_compat.dictionary(tag.dictionary)  # an unknown name fails here and not in the loop
+        # An unknown name fails here and not in the loop.
+        self._cells = cv_compat.dictionary(tag.dictionary).markerSize + 2
 
     def locate(
         self, image_bgr: Image, predicted: Pose | None, search_radius_m: float
@@ -196,7 +198,7 @@ class TagLocaliser:
             return None
         pose, _ = fit_pose(CORNERS * 0.5 * side_m, floor)
         seen_m = float(np.mean(np.linalg.norm(np.diff(floor, axis=0, append=floor[:1]), axis=1)))
-        outline: _Outline | None = _Outline(pose, seen_m, math.inf, 0, 0.0)
+        outline: _Outline | None = _Outline(pose, seen_m, math.inf, 0, 0.0, np.eye(3))
         if not abs(seen_m / side_m - 1.0) < 2.0 * SIDE_TOLERANCE:
             return outline
         for _ in range(REFINEMENTS):
@@ -212,7 +214,7 @@ class TagLocaliser:
         steps = np.linspace(-0.85, 0.85, SAMPLES_PER_SIDE)
         on_side = (NORMALS[:, None] + ALONG[:, None] * steps[None, :, None]).reshape(-1, 2) * half
         normals = np.repeat(NORMALS, SAMPLES_PER_SIDE, axis=0)
-        cell_m = square.side_m / 6.0
+        cell_m = square.side_m / self._cells
         inner = self._pixels(square.pose, on_side)
         outer = self._pixels(square.pose, on_side + normals * cell_m)
         across = outer - inner
@@ -226,7 +228,8 @@ class TagLocaliser:
         px = inner[good] + across[good] * shift_px[good, None]
         points = _into(square.pose, self._camera.floor_points(px, self._height_m))
         contrast_dn = float(np.median(contrast[good]))
-        return _fit_square(square, points, normals[good], contrast_dn)
+        free_m = SIGMA_FREE_PX * self._scale_m_px(square.pose)
+        return _fit_square(square, points, np.flatnonzero(good), contrast_dn, free_m)
 
     def _pixels(self, pose: Pose, tag_m: Array) -> Array:
         c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
@@ -279,11 +282,14 @@ class TagLocaliser:
             "side_m": outline.side_m,
             "points": float(outline.points),
         } | self._edges(outline, pose)
-        sigma_xy_m, sigma_theta_rad = self._sigmas(outline, scale)
+        claimed = of_body(outline.covariance_m2, pose.theta_rad, self._tag.x_m, self._tag.y_m)
         quality = min(1.0, outline.contrast_dn / QUALITY_CONTRAST_DN) * math.exp(
             -((residual_px / QUALITY_RESIDUAL_PX) ** 2)
         )
-        return PoseMeasurement(pose, quality, "", sigma_xy_m, sigma_theta_rad, details)
+        sigma_xy_m = math.sqrt(0.5 * (claimed[0] + claimed[3]))
+        return PoseMeasurement(
+            pose, quality, "", sigma_xy_m, math.sqrt(claimed[5]), details, claimed
+        )
 
     def _edges(self, outline: _Outline, pose: Pose) -> dict[str, float]:
         """Return where the middles of the edges towards the robot's front and rear lie in the image, px."""
@@ -295,20 +301,6 @@ class TagLocaliser:
             u, v = self._camera.project_point(x_m, y_m, self._height_m)
             found |= {f"{name}_u_px": u, f"{name}_v_px": v}
         return found
-
-    def _sigmas(self, outline: _Outline, scale_m_px: float) -> tuple[float, float]:
-        """Return the standard deviations of place and heading.
-
-        Half the points bear on each axis; all of them bear on the heading with an arm of
-        half * 0.85 / sqrt 3 RMS. The doubt of the mark's height adds along the ray.
-        """
-        noise_m = max(outline.residual_m, SIGMA_MIN_PX * scale_m_px)
-        u, v = self._camera.project_point(outline.pose.x_m, outline.pose.y_m, self._height_m)
-        lean = math.hypot(*self._camera.lean(u, v))
-        place = noise_m / math.sqrt(0.5 * outline.points)
-        arm_m = 0.5 * outline.side_m * 0.85 / math.sqrt(3.0)
-        heading = noise_m / (arm_m * math.sqrt(outline.points))
-        return math.hypot(place, lean * SIGMA_HEIGHT_M / math.sqrt(2.0)), heading
 
 
 def _not_seen(reason: str, details: dict[str, float]) -> PoseMeasurement:
@@ -353,12 +345,15 @@ def _bilinear(level: Image, px: Array) -> Array:
     return mixed
 
 
-def _fit_square(square: _Outline, points: Array, normals: Array, contrast_dn: float) -> _Outline:
+def _fit_square(
+    square: _Outline, points: Array, edges: NDArray[np.intp], contrast_dn: float, free_m: float
+) -> _Outline:
     """Return the square moved, turned and sized to edge points given in its own frame.
 
-    Distances to the sides are linear in (dx, dy, dtheta, dhalf); one pass leaves out points that
-    lie far from the first fit (something across the tag).
+    `edges` are their numbers, SAMPLES_PER_SIDE a side. Distances to the sides are linear in (dx, dy,
+    dtheta, dhalf); one pass leaves out points that lie far from the first fit (something across the tag).
     """
+    normals = NORMALS[edges // SAMPLES_PER_SIDE]
     lever = normals[:, 1] * points[:, 0] - normals[:, 0] * points[:, 1]
     A = np.column_stack((normals, lever, np.ones(len(points))))
     distance = np.sum(normals * points, axis=1) - 0.5 * square.side_m
@@ -376,7 +371,11 @@ def _fit_square(square: _Outline, points: Array, normals: Array, contrast_dn: fl
         square.pose.x_m + c * dx - s * dy, square.pose.y_m + s * dx + c * dy, theta + dtheta
     )
     residual = float(np.sqrt(np.mean(rest[keep] ** 2)))
-    return _Outline(pose, square.side_m + 2.0 * dhalf, residual, int(keep.sum()), contrast_dn)
+    side, along = np.divmod(edges[keep], SAMPLES_PER_SIDE)
+    along = 2.0 * along / (SAMPLES_PER_SIDE - 1) - 1.0
+    claimed = covariance_m2(A[keep], rest[keep], side, along, free_m)
+    side_m = square.side_m + 2.0 * dhalf
+    return _Outline(pose, side_m, residual, int(keep.sum()), contrast_dn, claimed)
 
 
 @LOCALISERS.register("tags", summary="one ArUco or AprilTag of a stated size on the robot's plate")

@@ -182,7 +182,7 @@ class Pool:
             left = (place for place in range(len(jobs)) if place not in results)
             try:
                 futures = {
-                    self._pool.submit(self._work, [jobs[i] for i in places]): places
+                    submit(self._pool, self._work, [jobs[i] for i in places]): places
                     for places in groups_of(left, size)
                 }
                 for future in as_completed(futures):
