@@ -12,9 +12,7 @@ grow with the run.
 
 from __future__ import annotations
 
-import functools
 import math
-import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
@@ -22,7 +20,16 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from hil.analysis import sliding
-from hil.analysis.pieces import percentiles, pieces, row_count
+from hil.analysis.column_sums import (
+    ends,
+    held_integral,
+    mean_while_ran,
+    percentiles_of,
+    sign_changes,
+    total,
+    variation,
+)
+from hil.analysis.pieces import pieces, row_count
 from hil.analysis.sliding import LawFacts
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME, METRICS, Metric, metric_of
@@ -136,7 +143,7 @@ def compute(
         raise BadInput(f"run record: {rows} rows of samples, the figures need at least 2")
     true_error = has_truth(columns)
     who, names = "true" if true_error else "est", _names_of_error(true=true_error)
-    span_s = _ends(columns, "t_s")
+    span_s = ends(columns, "t_s")
     with np.errstate(over="ignore", invalid="ignore"):  # of a damaged record: they are inf or NaN
         values = (
             _error_figures(columns, names, span_s)
@@ -224,17 +231,6 @@ def error_components(columns: Columns) -> tuple[Array, Array]:
     return columns[x_name], columns[y_name]
 
 
-def _ends(columns: Columns, name: str) -> tuple[float, float]:
-    """Return the first and the last value of a column."""
-    parts = [piece[name] for piece in pieces(columns, [name])]
-    return float(parts[0][0]), float(parts[-1][-1])
-
-
-def _sum(parts: Iterable[float]) -> float:
-    """Add up the sums of the pieces; that of one piece is left as it is."""
-    return float(functools.reduce(operator.add, parts))
-
-
 class _Settling:
     """From when on the error stays within a band; each piece begins with the row before it."""
 
@@ -274,9 +270,9 @@ def _error_figures(
     return {
         "delta1_final_m": final,
         "delta1_worst_last_second_m": float(np.max(worst)),
-        "ise_m2_s": _sum(ise),
-        "iae_m_s": _sum(iae),
-        "itae_m_s2": _sum(itae),
+        "ise_m2_s": total(ise),
+        "iae_m_s": total(iae),
+        "itae_m_s2": total(itae),
     } | {name: band.time_s for name, band in bands.items()}
 
 
@@ -288,11 +284,11 @@ def _motion_figures(
         np.hypot(np.diff(piece[x_name]), np.diff(piece[y_name])).sum()
         for piece in pieces(columns, [x_name, y_name], before=1)
     ]
-    first_rad, last_rad = _ends(columns, f"{who}_theta_rad")
+    first_rad, last_rad = ends(columns, f"{who}_theta_rad")
     start_s, end_s = span_s
     return {
-        "path_length_m": _sum(way_m),
-        "start_offset_x_m": _ends(columns, error_x_name)[0],
+        "path_length_m": total(way_m),
+        "start_offset_x_m": ends(columns, error_x_name)[0],
         "turn_rad": last_rad - first_rad,
         "duration_s": end_s - start_s,
     }
@@ -302,16 +298,16 @@ def _effort_figures(columns: Columns) -> dict[str, float]:
     left, right = "pwm_left_counts", "pwm_right_counts"
     return {
         "control_energy_m2_s3": _control_energy(columns),
-        "pwm_energy_counts2_s": _held_integral(columns, left, right),
-        "eta1_variation_m_s": _variation(columns, "eta1_cmd_m_s"),
-        "theta_dot_variation_rad_s": _variation(columns, "theta_dot_cmd_rad_s"),
-        "pwm_variation_counts": _variation(columns, left) + _variation(columns, right),
-        "saturated_share": _mean_of_ran(columns, "saturated"),
+        "pwm_energy_counts2_s": held_integral(columns, left, right),
+        "eta1_variation_m_s": variation(columns, "eta1_cmd_m_s"),
+        "theta_dot_variation_rad_s": variation(columns, "theta_dot_cmd_rad_s"),
+        "pwm_variation_counts": variation(columns, left) + variation(columns, right),
+        "saturated_share": mean_while_ran(columns, "saturated"),
     }
 
 
 def _sliding_figures(columns: Columns, start_s: float) -> dict[str, float]:
-    changes = _sign_changes(columns, "s_x_m_s2") + _sign_changes(columns, "s_y_m_s2")
+    changes = sign_changes(columns, "s_x_m_s2") + sign_changes(columns, "s_y_m_s2")
     ran_s, known, reached_s = [], False, math.nan
     for piece in pieces(columns, ["t_s", "in_layer", *sliding.RESTING], before=1):
         t_s, inside = piece["t_s"], piece["in_layer"]
@@ -320,17 +316,17 @@ def _sliding_figures(columns: Columns, start_s: float) -> dict[str, float]:
         reached = np.flatnonzero(inside == 1.0)
         if reached.size and math.isnan(reached_s):
             reached_s = float(t_s[reached[0]] - start_s)
-    in_all_s = _sum(ran_s)
+    in_all_s = total(ran_s)
     return {
         "s_sign_changes_hz": changes / in_all_s if known and in_all_s > 0.0 else math.nan,
-        "in_layer_share": _mean_of_ran(columns, "in_layer"),
+        "in_layer_share": mean_while_ran(columns, "in_layer"),
         "reaching_s": reached_s,
     }
 
 
 def _timing_figures(columns: Columns, link: LinkStats) -> dict[str, float]:
-    rtt_s = _percentiles(columns, "rtt_s")
-    to_actuation_s = _percentiles(columns, "exposure_to_actuation_s")
+    rtt_s = percentiles_of(columns, "rtt_s")
+    to_actuation_s = percentiles_of(columns, "exposure_to_actuation_s")
     misses = [np.nansum(p["deadline_miss"]) for p in pieces(columns, ["deadline_miss"])]
     return {
         "link_loss_ratio": link.loss_ratio,
@@ -338,7 +334,7 @@ def _timing_figures(columns: Columns, link: LinkStats) -> dict[str, float]:
         "rtt_p99_s": rtt_s[1],
         "exposure_to_actuation_median_s": to_actuation_s[0],
         "exposure_to_actuation_p99_s": to_actuation_s[1],
-        "deadline_misses": _sum(misses),
+        "deadline_misses": total(misses),
     }
 
 
@@ -351,57 +347,7 @@ def _control_energy(columns: Columns) -> float:
         told = told or bool(np.isfinite(piece["zeta_m_s2"][mine] + piece["u2_m_s2"][mine]).any())
     if ran and not told:
         return math.nan
-    return _held_integral(columns, "zeta_m_s2", "u2_m_s2")
-
-
-def _held_integral(columns: Columns, one: str, other: str) -> float:
-    """Integrate the squares of two signals that are held from tick to tick; unknown ones are zero."""
-    sums, known = [], False
-    for piece in pieces(columns, ["t_s", one, other], before=1):
-        squares = piece[one] ** 2 + piece[other] ** 2
-        held = squares[:-1] * np.diff(piece["t_s"])
-        sums.append(np.nansum(held))
-        known = known or bool(np.isfinite(held).any())
-    return _sum(sums) if known else math.nan
-
-
-def _variation(columns: Columns, name: str) -> float:
-    """Return the sum of |change| between successive known values."""
-    sums, before = [], np.empty(0)
-    for piece in pieces(columns, [name]):
-        values = piece[name]
-        known = np.concatenate((before, values[np.isfinite(values)]))
-        sums.append(np.abs(np.diff(known)).sum())
-        before = known[-1:]
-    return _sum(sums) if before.size else math.nan
-
-
-def _sign_changes(columns: Columns, name: str) -> int:
-    """Count the changes of sign while the law ran, passing over zeros and unknown values."""
-    count, before = 0, np.empty(0)
-    for piece in pieces(columns, [name, *sliding.RESTING]):
-        values = piece[name][sliding.law_ran(piece)]
-        signs = np.sign(values[np.isfinite(values) & (values != 0.0)])
-        signs = np.concatenate((before, signs))
-        count += int(np.count_nonzero(np.diff(signs)))
-        before = signs[-1:]
-    return count
-
-
-def _mean_of_ran(columns: Columns, name: str) -> float:
-    """Return the mean of the known values while the law ran."""
-    sums, count = [], 0
-    for piece in pieces(columns, [name, *sliding.RESTING]):
-        values = piece[name][sliding.law_ran(piece)]
-        known = values[np.isfinite(values)]
-        sums.append(known.sum())
-        count += known.size
-    return _sum(sums) / count if count else math.nan
-
-
-def _percentiles(columns: Columns, name: str) -> list[float]:
-    """Return median and 99th percentile of the known values."""
-    return percentiles(lambda: (piece[name] for piece in pieces(columns, [name])), [50, 99])
+    return held_integral(columns, "zeta_m_s2", "u2_m_s2")
 
 
 def _finite(value: float) -> float | None:
