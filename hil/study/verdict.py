@@ -193,7 +193,7 @@ def shipped_gains(laws: Sequence[str]) -> Data:
 
 def shipped_scores(field: Field, plan: VerdictPlan, yard: Yardstick, make: Make) -> Data:
     """Return the scores of the gains that ship in each unseen cell, by law."""
-    return {law: _judged(law, None, field, plan, yard, make) for law in field.laws}
+    return {law: unseen_scores(law, None, field, plan, yard, make) for law in field.laws}
 
 
 def _scores(
@@ -233,7 +233,7 @@ def _judge_front(
                 "values": one.values,
                 "single_best": one is single or one == single,
                 "search": _rounded(one.scores),
-                "unseen": _judged(
+                "unseen": unseen_scores(
                     front.law, base.with_values(entry, one.values), field, plan, yard, make
                 ),
             }
@@ -242,7 +242,7 @@ def _judge_front(
     }
 
 
-def _judged(
+def unseen_scores(
     law: str, gains: Gains | None, field: Field, plan: VerdictPlan, yard: Yardstick, make: Make
 ) -> dict[str, list[list[float]]]:
     """Return the scores of each run in each unseen cell."""
