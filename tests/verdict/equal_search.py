@@ -69,8 +69,8 @@ def mean_accuracy(cells):
 def table(found, shipped):
     """Return the page's table: laws by their cost on held-out seeds."""
     lines = [
-        "| law, 301 candidates | cost in the search | on 100 unseen seeds | accuracy on unseen tasks (ended early) "
-        "| that of the set that ships |",
+        "| law, 301 candidates | cost in the search | on 100 unseen seeds "
+        "| accuracy on unseen tasks (ended early) | that of the set that ships |",
         "| --- | --- | --- | --- | --- |",
     ]
     for law, one in sorted(found.items(), key=lambda item: item[1]["held_out_cost"]):
