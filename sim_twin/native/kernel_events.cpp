@@ -59,6 +59,16 @@ double zone_weight(const Disturbance& d, double x_m, double y_m) {
 // Noise on an encoder's wires: a pulse on both channels in the first 0.1 ms of each millisecond.
 bool glitches(double t_s) { return std::fmod(t_s + 1e-9, 1e-3) < 1e-4; }
 
+// When the next of the items begins or ends after t_s.
+template <typename Item>
+double next_change_s(const std::vector<Item>& items, double t_s) {
+  double until_s = std::numeric_limits<double>::infinity();
+  for (const Item& item : items) {
+    if (t_s < item.end_s) until_s = std::min(until_s, t_s < item.start_s ? item.start_s : item.end_s);
+  }
+  return until_s;
+}
+
 }  // namespace
 
 double disturbance_value(const Disturbance& d, double t_s, double x_m, double y_m) {
@@ -72,17 +82,7 @@ LoadVector Disturbances::loads(double t_s, double x_m, double y_m) const {
   return out;
 }
 
-double Disturbances::steady_until_s(double t_s) const {
-  double until_s = std::numeric_limits<double>::infinity();
-  for (const Disturbance& d : items_) {
-    if (t_s < d.start_s) {
-      until_s = std::min(until_s, d.start_s);
-    } else if (t_s < d.end_s) {
-      until_s = std::min(until_s, d.end_s);
-    }
-  }
-  return until_s;
-}
+double Disturbances::steady_until_s(double t_s) const { return next_change_s(items_, t_s); }
 
 bool Disturbances::at_work(double t_s) const {
   return std::any_of(items_.begin(), items_.end(),
@@ -119,16 +119,10 @@ FaultState Faults::at(double t_s) const {
 }
 
 double Faults::steady_until_s(double t_s) const {
-  double until_s = std::numeric_limits<double>::infinity();
-  for (const Fault& fault : items_) {
-    if (t_s < fault.start_s) {
-      until_s = std::min(until_s, fault.start_s);
-    } else if (t_s < fault.end_s) {
-      if (fault.kind == FaultKind::kEncoderNoise) return t_s;
-      until_s = std::min(until_s, fault.end_s);
-    }
-  }
-  return until_s;
+  const bool noise = std::any_of(items_.begin(), items_.end(), [t_s](const Fault& fault) {
+    return fault.kind == FaultKind::kEncoderNoise && fault.start_s <= t_s && t_s < fault.end_s;
+  });
+  return noise ? t_s : next_change_s(items_, t_s);
 }
 
 }  // namespace twin
