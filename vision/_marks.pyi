@@ -69,6 +69,14 @@ class Disc:
         """How much of what its rim is off varies four times round, 0 to 1; a square has 0.7 and more."""
 
     @property
+    def beyond(self) -> float:
+        """The part of its rim beyond which its own colour goes on."""
+
+    @property
+    def hollow(self) -> float:
+        """The part of the rim seen inside which its colour is not."""
+
+    @property
     def ground_ratio(self) -> float:
         """Brightness beside it over its own."""
 

@@ -22,7 +22,7 @@ from hil.core.types import Pose, PoseMeasurement
 from vision._marks import Spot, gap_variance, spot
 from vision.camera import CameraModel, longest_px
 from vision.disc_fit import Disc, Marks, RimFitter, check_colour, compiled
-from vision.mark_limits import four_cornered, refusal, rough_px, scale_refusal
+from vision.mark_limits import doubts, four_cornered, refusal, rough_px, scale_refusal
 from vision.mark_search import CHROMA_BASIS, Centres, MarkSearch, Point, Window
 from vision.pose_fit import weighted_pose
 from vision.rivals import THIRD_MARK, Rivals
@@ -243,10 +243,13 @@ class MarkLocaliser:
 
     def _poor(self, found: _Found) -> str:
         """Return why a find is hardly within each limit, "" when it is well within some."""
-        quality = self._quality(found)
-        if quality >= QUALITY_MIN:
+        against = doubts(found.discs)
+        score = self._quality(found) * math.exp(-0.5 * sum(off**2 for off in against.values()))
+        if score >= QUALITY_MIN:
             return ""
-        return f"rims and distance fit badly together: {quality:.3f}, limit {QUALITY_MIN}"
+        most = max(against, key=lambda what: against[what])
+        why = f", {most}" if against[most] >= 1.0 else ""
+        return f"rims and distance fit badly together{why}: {score:.3f}, limit {QUALITY_MIN}"
 
     def _quality(self, found: _Found) -> float:
         """Return the smaller share of rim times how well rims and distance fit; 1 is whole and sharp."""

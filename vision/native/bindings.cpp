@@ -80,7 +80,9 @@ void bind_rims(nb::module_& m) {
       .def_ro("covariance_px2", &Disc::covariance_px2)
       .def_ro("contrast_dn", &Disc::contrast_dn)
       .def_ro("ground_ratio", &Disc::ground_ratio)
-      .def_ro("square", &Disc::square);
+      .def_ro("square", &Disc::square)
+      .def_prop_ro("beyond", [](const Disc& disc) { return disc.beside.beyond; })
+      .def_prop_ro("hollow", [](const Disc& disc) { return disc.beside.hollow; });
   nb::class_<RimFitter>(m, "RimFitter")
       .def(
           "__init__",

@@ -249,7 +249,8 @@ Disc RimFitter::disc(const Picture& picture, const Step& step, Evidence& evidenc
               {},
               step.edges.typical_dn,
               ratios[kept / 2],
-              squareness(off)};
+              squareness(off),
+              {}};
 }
 
 std::optional<std::array<Disc, 2>> RimFitter::fit(const Picture& picture,
@@ -294,6 +295,12 @@ std::optional<std::array<Disc, 2>> RimFitter::fit(const Picture& picture,
   std::array<Disc, 2> discs = {disc(picture, steps[0], shown[0]), disc(picture, steps[1], shown[1])};
   for (int k = 0; k < 2; ++k) {
     discs[k].covariance_px2 = claim(shown[k], shown[1 - k]);
+    std::array<Vec2, kRays> rim;
+    for (int ray = 0; ray < kRays; ++ray) {
+      rim[ray] = (1.0 + discs[k].growth) * steps[k].shape.arms[ray];
+    }
+    const Vec2 centre_px = {discs[k].u_px, discs[k].v_px};
+    discs[k].beside = beside(picture, centre_px, rim, weights_[k], discs[k].contrast_dn, steps[k].keep);
   }
   return discs;
 }

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "beside.hpp"
 #include "camera.hpp"
 #include "claim.hpp"
 #include "picture.hpp"
@@ -17,11 +18,12 @@ namespace vision {
 // One fitted disc. (u, v) is the image of its centre, `growth` its radius over the known one less 1,
 // `share` the part of its rim that was seen, `residual_px` the RMS of those edges, the covariance
 // that of (u, v), `ground_ratio` the brightness beside it over its own, `square` is near 1
-// for one that has four corners.
+// for one that has four corners, `beside` what goes on beyond its rim and is not in its middle.
 struct Disc {
   double u_px, v_px, radius_px, growth, share, residual_px;
   std::array<double, 3> covariance_px2;  // uu, uv, vv
   double contrast_dn, ground_ratio, square;
+  Beside beside;
 };
 
 class RimFitter {
