@@ -70,11 +70,11 @@ class Disc:
 
     @property
     def beyond(self) -> float:
-        """The part of its rim beyond which its own colour goes on."""
+        """The part of its rim over which its own colour goes on."""
 
     @property
     def hollow(self) -> float:
-        """The part of the rim seen inside which its colour is not."""
+        """The part of its rim inside which its colour is not, though it is at the rim."""
 
     @property
     def ground_ratio(self) -> float:

@@ -23,12 +23,11 @@ WHOLE_SHARE = 0.96
 # A wrong height changes size and distance alike; blur, focus and gamma the size alone, by 5 % at most
 # beyond the noise in all conditions of the bench, and scissors by some more.
 SCALE_MAX, SCALE_SIGMAS = 0.065, 2.5
-# What else speaks against two discs, each as a standard deviation of robots with and without covers: four corners
-# beyond so much; the part of a rim over which its colour goes on; the part of a rim seen inside which it is not,
-# beyond what something that lies over the middle, and so over the rim, hides there for what it hides of the rim.
+# What else speaks against two discs, each as a standard deviation of robots with and without covers: corners
+# beyond so many; the part of a rim over which its colour goes on; the part inside which that colour is not.
 CORNERS_FREE, CORNERS_SIGMA = 0.4, 0.12
 BEYOND_SIGMA = 0.06
-HOLLOW_SIGMA, HOLLOW_COVERED = 0.3, 2.0
+HOLLOW_SIGMA = 0.2
 
 
 def refusal(disc: Disc, ground_ratio_max: float, sizes: float = 1.0) -> str:
@@ -61,11 +60,11 @@ def doubts(discs: Marks) -> dict[str, float]:
     """Return what speaks against two discs and is no limit by itself, in sigmas, by what it is."""
     corners = 0.5 * sum(disc.square for disc in discs)
     beyond = max(disc.beyond for disc in discs)
-    hollow = max(disc.hollow - HOLLOW_COVERED * (1.0 - disc.share) for disc in discs)
+    hollow = max(disc.hollow for disc in discs)
     return {
         "four corners": max(corners - CORNERS_FREE, 0.0) / CORNERS_SIGMA,
         f"their colour goes on over {beyond:.0%} of a rim": beyond / BEYOND_SIGMA,
-        "a middle of another colour": max(hollow, 0.0) / HOLLOW_SIGMA,
+        "a middle of another colour": hollow / HOLLOW_SIGMA,
     }
 
 

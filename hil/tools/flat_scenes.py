@@ -2,8 +2,8 @@
 
 The twin's renderer takes a second to prepare a scene and milliseconds a frame. What a localiser makes of
 coloured things hangs on the scene and hardly on the noise, so here a scene is what is cheap: every thing is
-painted over those before it where it seems to lie on the plane of the marks, each pixel covered by as much as nine
-points of it say. No sides, no shade; light, blur, noise and JPEG are those of `vision_conditions`.
+painted over those before it where it seems to lie on the plane of the marks, each pixel covered by as much
+as nine points of it say. No sides, no shade; light, blur, noise and JPEG are those of `vision_conditions`.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ namespace {
 // within it clear of what motion and lens smear.
 constexpr std::array<double, 3> kBeyond = {1.2, 1.4, 1.6};
 constexpr std::array<double, 2> kWithin = {0.25, 0.4};
+constexpr double kRing = 0.8;
 // A colour goes on where it has so much of the disc's response all along, and is not there with less.
 constexpr double kGoesOn = 0.6;
 constexpr double kMissing = 0.5;
@@ -40,7 +41,7 @@ Ring ring(const Picture& picture, Vec2 centre_px, const std::array<Vec2, kRays>&
 }  // namespace
 
 Beside beside(const Picture& picture, Vec2 centre_px, const std::array<Vec2, kRays>& arms,
-              const Colour& weights, double typical_dn, const Mask& keep) {
+              const Colour& weights, double typical_dn) {
   Mask goes_on, missing;
   goes_on.fill(true);
   missing.fill(true);
@@ -56,15 +57,14 @@ Beside beside(const Picture& picture, Vec2 centre_px, const std::array<Vec2, kRa
       missing[ray] = missing[ray] && in.seen[ray] && in.level[ray] < kMissing * typical_dn;
     }
   }
+  const Ring about = ring(picture, centre_px, arms, weights, kRing);
   int beyond = 0;
   int hollow = 0;
-  int kept = 0;
   for (int ray = 0; ray < kRays; ++ray) {
-    kept += keep[ray] ? 1 : 0;
     beyond += goes_on[ray] ? 1 : 0;
-    hollow += keep[ray] && missing[ray] ? 1 : 0;
+    hollow += missing[ray] && about.level[ray] > kGoesOn * typical_dn ? 1 : 0;
   }
-  return {static_cast<double>(beyond) / kRays, kept > 0 ? static_cast<double>(hollow) / kept : 0.0};
+  return {static_cast<double>(beyond) / kRays, static_cast<double>(hollow) / kRays};
 }
 
 }  // namespace vision

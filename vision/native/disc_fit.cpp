@@ -300,7 +300,7 @@ std::optional<std::array<Disc, 2>> RimFitter::fit(const Picture& picture,
       rim[ray] = (1.0 + discs[k].growth) * steps[k].shape.arms[ray];
     }
     const Vec2 centre_px = {discs[k].u_px, discs[k].v_px};
-    discs[k].beside = beside(picture, centre_px, rim, weights_[k], discs[k].contrast_dn, steps[k].keep);
+    discs[k].beside = beside(picture, centre_px, rim, weights_[k], discs[k].contrast_dn);
   }
   return discs;
 }
