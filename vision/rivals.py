@@ -29,6 +29,8 @@ TOLERANCE, COARSE = 0.11, 0.9
 # Its size is no further off its partner's than this beyond what the two marks are off each other, to the
 # known one; and it may be off the known size by so much more than a mark.
 UNLIKE, SIZES = 0.02, 1.5
+# What claims its place no better than so many radii is noise, and has no distance that could be the robot's.
+CLAIM_MAX = 0.2
 
 
 class Rivals:
@@ -57,7 +59,7 @@ class Rivals:
         return False
 
     def _is_rival(self, disc: Disc, discs: Marks, centres_m: Centres, unlike: float) -> bool:
-        if refusal(disc, self._ground_ratio_max, SIZES):
+        if refusal(disc, self._ground_ratio_max, SIZES) or not _placed(disc):
             return False
         place = self._model.floor_point(disc.u_px, disc.v_px, self._height_m)
         if self._own(place, centres_m):
@@ -73,3 +75,9 @@ class Rivals:
         """Return which of the two marks lie the robot's distance from a place."""
         away = (abs(math.dist(place_m, own) - self._distance_m) for own in centres_m)
         return [k for k, off_m in enumerate(away) if off_m < within_m]
+
+
+def _placed(disc: Disc) -> bool:
+    """Return whether it is known where a disc lies."""
+    uu, _, vv = disc.covariance_px2
+    return math.sqrt(uu + vv) <= CLAIM_MAX * disc.radius_px
