@@ -41,6 +41,9 @@ _SPEED = ("speed", "parts", "batch", "law", "campaign", "report")
 @click.option("--scenes", metavar="FROM..TO",
               help="vision: only the frames without the robot, those of these scenes (50 each), so that "
               "a long run can be made in pieces.")  # fmt: skip
+@click.option("--drawn", metavar="FROM..TO",
+              help="vision: only these scenes of look-alikes drawn flat, each another one, one frame of "
+              "each, of 15 kinds in turn.")  # fmt: skip
 @click.option("--longest", type=click.IntRange(10, 36_000), default=3_600, show_default=True,
               help="growth: runs up to so many seconds.")  # fmt: skip
 @click.option("--most-rows", type=click.IntRange(10, 1_000_000), default=100_000, show_default=True,
@@ -50,8 +53,8 @@ _SPEED = ("speed", "parts", "batch", "law", "campaign", "report")
 @json_option
 def command(
     what: str, runs: int, candidates: int | None, against: Path | None, page: Path | None,
-    frames: int, empty: int, scenes: str | None, longest: int, most_rows: int, plot: Path | None,
-    as_json: bool,
+    frames: int, empty: int, scenes: str | None, drawn: str | None, longest: int, most_rows: int,
+    plot: Path | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Measure the speed of the harness, or compare the wheel laws of the board.
 
@@ -78,14 +81,16 @@ def command(
         raise click.UsageError(f"--against: for {', '.join(_SPEED)}")
     if plot is not None and (what != "growth" or not plot.absolute().parent.is_dir()):
         raise click.UsageError(f"--plot {plot}: for growth, in a folder that exists")
-    if scenes is not None and (what != "vision" or page is not None):
-        raise click.UsageError("--scenes: for vision, without --page, whose frames have the robot")
+    if (scenes or drawn) is not None and (what != "vision" or page is not None):
+        raise click.UsageError(
+            "--scenes, --drawn: for vision, without --page, whose frames have the robot"
+        )
     if candidates is not None:
         _tune_wheels(candidates, runs, as_json)
     elif what == "wheels":
         _compare_wheels(runs, as_json)
     elif what == "vision":
-        _measure_vision(frames, empty, scenes, page, as_json)
+        _measure_vision(frames, empty, scenes, drawn, page, as_json)
     elif what == "firmware":
         _measure_firmware(as_json)
     elif what == "growth":
@@ -95,8 +100,18 @@ def command(
 
 
 def _measure_vision(
-    frames: int, without: int, scenes: str | None, page: Path | None, as_json: bool
+    frames: int,
+    without: int,
+    scenes: str | None,
+    drawn: str | None,
+    page: Path | None,
+    as_json: bool,
 ) -> None:
+    if scenes is not None and drawn is not None:
+        raise click.UsageError("--scenes, --drawn: one at a time; each shows nothing else")
+    if drawn is not None:
+        _show_drawn(drawn, as_json)
+        return
     if scenes is not None:
         _show_scenes(scenes, as_json)
         return
@@ -126,7 +141,7 @@ def _show_scenes(asked: str, as_json: bool) -> None:
 
     from hil.tools import bench_vision, look_alikes
 
-    first, last = _range(asked)
+    first, last = _range(asked, "--scenes")
     per_scene, views = look_alikes.FRAMES_PER_SCENE, tuple(bench_vision.VIEWS.values())
     found = look_alikes.empty_scenes(
         (last - first + 1) * per_scene, views, lambda text: click.echo(text, err=True), first=first
@@ -137,11 +152,24 @@ def _show_scenes(asked: str, as_json: bool) -> None:
         click.echo(bench_vision.in_words(found))
 
 
-def _range(asked: str) -> tuple[int, int]:
+def _show_drawn(asked: str, as_json: bool) -> None:
+    from dataclasses import asdict
+
+    from hil.tools import drawn_look_alikes
+
+    first, last = _range(asked, "--drawn")
+    found = drawn_look_alikes.drawn_scenes(first, last, lambda text: click.echo(text, err=True))
+    if as_json:
+        print_json({"drawn_scenes": asdict(found)})
+    else:
+        click.echo(drawn_look_alikes.as_markdown(found))
+
+
+def _range(asked: str, option: str) -> tuple[int, int]:
     """Return the first and the last number of FROM..TO."""
     ends = asked.split("..")
     if len(ends) != 2 or not all(end.isdecimal() for end in ends) or int(ends[0]) > int(ends[1]):
-        raise click.UsageError(f"--scenes {asked}: two numbers from 0 up, say 0..199")
+        raise click.UsageError(f"{option} {asked}: two numbers from 0 up, say 0..199")
     return int(ends[0]), int(ends[1])
 
 

@@ -303,7 +303,8 @@ def scene(number: int, seed: int = 30) -> Scene:
 
 
 def _views() -> dict[str, CameraPoseConfig]:
-    return {**BENCH_VIEWS, "near": VIEWS["oblique"], "boom": CameraPoseConfig()}
+    own: dict[str, CameraPoseConfig] = {str(name): view for name, view in BENCH_VIEWS.items()}
+    return own | {"near": VIEWS["oblique"], "boom": CameraPoseConfig()}
 
 
 @lru_cache(maxsize=8)
@@ -365,3 +366,11 @@ def together(pieces: Sequence[Drawn]) -> Drawn:
         sum(piece.equals for piece in pieces),
         tuple(sorted(number for piece in pieces for number in piece.taken_in)),
     )
+
+
+def as_markdown(found: Drawn) -> str:
+    """Return what was shown and taken for the robot, by kind, as docs/vision.md keeps it."""
+    rows = [f"| {kind} | {shown} | {taken} |" for kind, shown, taken in found.kinds]
+    rows.append(f"| all | {found.scenes} | {found.accepted} |")
+    head = ["| kind | scenes | accepted |", "| --- | --- | --- |"]
+    return "\n".join([*head, *rows])

@@ -47,7 +47,8 @@ class FlatScenes:
         at_m = model.floor_points(px, height_m).reshape(*u.shape, 2)
         self._at_m = at_m.astype(np.float32)
         down, across = np.gradient(at_m, axis=(0, 1))
-        self._across_m, self._down_m = across.astype(np.float32), down.astype(np.float32)
+        self._across_m: Floats = np.asarray(across, np.float32)
+        self._down_m: Floats = np.asarray(down, np.float32)
         rng = np.random.default_rng(seed)
         patches = (model.height_px // PATCH_PX + 1, model.width_px // PATCH_PX + 1)
         coarse = 1.0 + TEXTURE_RATIO * rng.standard_normal(patches)
@@ -88,18 +89,19 @@ class FlatScenes:
 
     def _covered(self, thing: ClutterConfig, window: tuple[slice, slice]) -> Floats:
         """Return how much of each pixel of a window a thing covers, 0 to 1."""
-        off = self._at_m[window] - np.array((thing.x_m, thing.y_m), np.float32)
+        off: Floats = self._at_m[window] - np.array((thing.x_m, thing.y_m), np.float32)
         across, down = self._across_m[window], self._down_m[window]
         c, s = math.cos(thing.theta_rad), math.sin(thing.theta_rad)
         turn = np.array(((c, -s), (s, c)), np.float32)
         off, across, down = off @ turn, across @ turn, down @ turn
-        half = 0.5 * np.array(thing.size_m, np.float32)
+        half_x, half_y = (0.5 * size_m for size_m in thing.size_m)
+        half = np.array((half_x, half_y), np.float32)
         total = np.zeros(off.shape[:2], np.float32)
         for right in SUBPIXELS:
             for below in SUBPIXELS:
                 at = off + np.float32(right) * across + np.float32(below) * down
                 if thing.shape == "disc":
-                    total += np.einsum("ijk,ijk->ij", at, at) < half[0] ** 2
+                    total += np.einsum("ijk,ijk->ij", at, at) < np.float32(half_x) ** 2
                 else:
                     total += (np.abs(at) < half).all(axis=2)
         return np.asarray(total / len(SUBPIXELS) ** 2, np.float32)

@@ -1,9 +1,9 @@
 """Draws what `hil bench vision` has measured into docs/vision.md.
 
 `python -m tests.docs.vision FILE...` takes what `hil bench vision --json` has printed, and what pieces of it
-(`--scenes`) have, keeps that in tests/data/vision_bench.json and writes the lines between the page's marks;
-without a file it draws what is kept. `--page` takes what `hil bench vision --page` has written and puts its
-pictures together in docs/vision-worst.webp.
+(`--scenes`, `--drawn`) have, keeps that in tests/data/vision_bench.json and writes the lines between the
+page's marks; without a file it draws what is kept. `--page` takes what `hil bench vision --page` has written
+and puts its pictures together in docs/vision-worst.webp.
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ from typing import Any
 import cv2
 import numpy as np
 
+from hil.tools import drawn_look_alikes
 from hil.tools.bench_peers import Line, as_markdown
+from hil.tools.drawn_look_alikes import Drawn
 from hil.tools.look_alikes import Empty, most_ratio, together
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -59,6 +61,22 @@ def empty(found: Empty) -> str:
     )
 
 
+def drawn_flat(found: Drawn) -> str:
+    """Return how many drawn scenes there are, what was taken for the robot in them, and the table by kind."""
+    most = most_ratio(found.accepted, found.scenes)
+    return (
+        f"{found.scenes:,} scenes ({found.equals} more held an equal of the robot and were left out), in"
+        f" {found.accepted} of which something was taken for it; with 95 % confidence that is less than"
+        f" {_share(most)} of such scenes:\n\n{drawn_look_alikes.as_markdown(found)}\n"
+    )
+
+
+def drawn_of_data(data: dict[str, Any]) -> Drawn:
+    """Return the counts of drawn scenes that JSON holds."""
+    kinds = tuple((kind, shown, taken) for kind, shown, taken in data["kinds"])
+    return Drawn(kinds, data["equals"], tuple(data["taken_in"]))
+
+
 def _share(ratio: float) -> str:
     return f"{100.0 * ratio:.2g} %"
 
@@ -68,6 +86,7 @@ def drawn(page: str, data: dict[str, Any]) -> str:
     parts = {
         "peers": peers([Line.of_data(line) for line in data["peers"]]),
         "without the robot": empty(of_data(data["empty_scenes"])),
+        "drawn flat": drawn_flat(drawn_of_data(data["drawn_scenes"])),
     }
     for part, text in parts.items():
         before, rest = page.split(begin(part))
@@ -86,11 +105,21 @@ def of_data(data: dict[str, Any]) -> Empty:
 
 
 def kept(files: list[Path]) -> dict[str, Any]:
-    """Return the lines beside peers, of the last file that has them, and all scenes together."""
+    """Return the lines beside peers, of the last file that has them, and all scenes together.
+
+    What no file has is that which is kept.
+    """
+    data: dict[str, Any] = json.loads(KEPT.read_text(encoding="utf-8"))
     found = [json.loads(file.read_text(encoding="utf-8")) for file in files]
-    lines = [document["peers"] for document in found if "peers" in document]
     pieces = [of_data(document["empty_scenes"]) for document in found if "empty_scenes" in document]
-    return {"peers": lines[-1], "empty_scenes": asdict(together(pieces))}
+    flat = [drawn_of_data(one["drawn_scenes"]) for one in found if "drawn_scenes" in one]
+    for document in found:
+        data["peers"] = document.get("peers", data["peers"])
+    if pieces:
+        data["empty_scenes"] = asdict(together(pieces))
+    if flat:
+        data["drawn_scenes"] = asdict(drawn_look_alikes.together(flat))
+    return data
 
 
 def worst(page: str) -> bytes:

@@ -103,4 +103,6 @@ def test_scenes_can_be_shown_in_pieces():
     assert list(drawn["piece"]) == [2, 3]
     assert drawn["piece"][3] == drawn["whole"][3] != drawn["whole"][2]
     for asked in ("5..4", "5", "-1..2"):
-        assert "--scenes" in hil("bench", "vision", "--scenes", asked).refusal
+        for option in ("--scenes", "--drawn"):
+            assert f"{option} {asked}" in hil("bench", "vision", option, asked).refusal
+    assert "one at a time" in hil("bench", "vision", "--scenes", "0..1", "--drawn", "0..1").refusal
