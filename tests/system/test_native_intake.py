@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from hil.board.wheel_laws import WHEEL_LAWS
 from hil.config.fit import board_parameters
 from hil.config.load import load_scenario
-from hil.control import _outer
+from hil.control import _outer, translated
 from hil.control.laws import chain
 from hil.control.laws.making import make_law, make_outer_law
 from hil.core import _native as core_native
@@ -321,6 +321,7 @@ def test_a_law_asked_in_python_gives_the_same_run(what, more):
     spec = replace(spec_of(ONE), outer="asg-ism-implicit", scenario=scenario)
     drives = []
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(translated, "is_translated", lambda _: False)
         patch.setattr(session, "make_drive", noted(REAL_DRIVE, drives))
         native = execute_in_memory(spec)
         patch.setattr(session, "make_drive", lambda *_: None)
