@@ -74,11 +74,6 @@ def _tables(value: Any) -> list[Any]:
             left.extend(one)
         elif issubclass(kind, tuple):
             left.extend(one)
-        elif _is_section(kind):
+        elif hasattr(kind, "model_config"):
             left.extend(vars(one).values())
     return found
-
-
-@functools.cache
-def _is_section(kind: type) -> bool:
-    return hasattr(kind, "model_fields")
