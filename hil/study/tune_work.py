@@ -123,7 +123,9 @@ def load_tasks(names: Sequence[str], robot: str | None, overrides: Sequence[str]
     """
     if robot is not None:
         if twice := [text for text in overrides if text.partition("=")[0].strip() == "robot.file"]:
-            raise BadInput(f"--robot {robot}, --set {twice[0]}: both name the robot; give one of them")
+            raise BadInput(
+                f"--robot {robot}, --set {twice[0]}: both name the robot; give one of them"
+            )
         overrides = (f"robot.file={toml_value(robot)}", *overrides)
     if len(names) == 1 and _is_deck(names[0]):
         deck = load_deck(names[0])
