@@ -1,7 +1,8 @@
 // The steps of one width, compiled for the processors that have it: a unit defines TWIN_LANES (robots side by
-// side), TWIN_ROOT (square roots of a register), TWIN_OVER_ROOT where it has a faster way to quotients by them, and
-// TWIN_RUN (the function's name), and takes this in. All but that function belongs to the unit alone.
+// side), TWIN_ROOT (square roots of a register), TWIN_RUN and TWIN_DIRECT (the functions' names), and takes this in.
+// All but those functions belongs to the unit alone.
 #include <cmath>
+#include <cstring>
 
 #include "lane_block.hpp"
 
@@ -149,6 +150,14 @@ void TWIN_RUN(void* at, int first, int steps, bool loaded) {
   } else {
     run<false, Acts::kNothing>(block, first, steps);
   }
+}
+
+void TWIN_DIRECT(const double* angle_rad, double* cos, double* sin) {
+  V angle;
+  std::memcpy(&angle, angle_rad, sizeof angle);
+  const Direction<V> to = Directions<Many<false>>::of(angle);
+  std::memcpy(cos, &to.cos, sizeof to.cos);
+  std::memcpy(sin, &to.sin, sizeof to.sin);
 }
 
 }  // namespace twin

@@ -12,6 +12,8 @@ namespace {
 // Slope of a brake's torque through rest, as stiff as a jam of the gears (kernel.cpp).
 constexpr double kStiffest_n_m_s_rad = 12.0;
 constexpr LoadVector kNoLoads{};
+// Below, no speed at which friction falls by half makes a difference, and its square has to be a number.
+constexpr double kLeastStribeck_m_s = 1e-9;
 
 // One robot: its left and right side share a register.
 struct One : Scalar {
@@ -87,7 +89,7 @@ Terms<double> derive(const PlantParams& p) {
   const double per_radius = 1.0 / p.wheel_radius_m;
   const double at_rim = p.motor_per_side * per_radius;  // N of a side's rims per N m of a motor at the wheel
   const double bridge_smoothing_a = p.bridge_smoothing_a / p.motor_per_side;
-  const double stribeck_m_s = p.motor_stribeck_rad_s * p.wheel_radius_m;
+  const double stribeck_m_s = std::max(p.motor_stribeck_rad_s * p.wheel_radius_m, kLeastStribeck_m_s);
   Terms<double> t{};
   t.mass_kg = p.mass_kg;
   t.inertia_kg_m2 = p.inertia_kg_m2;
@@ -130,7 +132,7 @@ Terms<double> derive(const PlantParams& p) {
     t.slide_rear_n = 0.0;
     t.castor_n = p.castor_friction_ratio * weight_n * castor_ratio;
   }
-  const double rim_kg = 2.0 * t.side_inertia_kg_m2 * t.per_radius * t.per_radius;
+  const double rim_kg = 2.0 * t.side_inertia_kg_m2 * per_radius * per_radius;
   t.per_mass_rim = 1.0 / (p.mass_kg + rim_kg);
   t.per_inertia_rim =
       1.0 / (p.inertia_kg_m2 + p.mass_kg * p.d0_m * p.d0_m + 0.25 * p.track_m * p.track_m * rim_kg);

@@ -54,8 +54,9 @@ struct Model {
     P current_dot;  // A/s, one motor
     P rim_n;        // what all motors of the side push the floor with, friction, load and rolling taken off
   };
-  struct Signs {
-    P first, second;
+  struct Friction {
+    P bridge_sign, slide_sign;  // soft signs: of the currents (left, right), of the axles' sliding (front, rear)
+    P dry_n;                    // of motors, gears and rolling, at the rims
   };
   struct Acceleration {
     N eta1_dot, eta2_dot, theta_ddot;  // m/s^2, m/s^2, rad/s^2, body frame
@@ -71,16 +72,6 @@ struct Model {
   const P& jam;
   typename M::Flag castor;
   bool slip = false, lifted = false;
-
-  // Sign with a soft middle: 0.71 at v = v_s, 0.995 at 10 v_s.
-  TWIN_INLINE static P soft_sign(const P& v, const N& v_s2) { return v / M::root(v * v + v_s2); }
-
-  // Two of them with one quotient, which does not wait for the roots: u / root(u^2 + u_s^2) is u root(..) / (..).
-  TWIN_INLINE static Signs soft_signs(const P& u, const N& u_s2, const P& v, const N& v_s2) {
-    const P u2 = u * u + u_s2, v2 = v * v + v_s2;
-    const P per = M::inverse(u2 * v2);
-    return {u * v2 * M::root(u2) * per, v * u2 * M::root(v2) * per};
-  }
 
   // Friction scaled by a change of it: there is none below -1, least of all one that drives.
   TWIN_INLINE static N grip(const Loads& load) { return M::not_negative(1.0 + load[kFrictionChange]); }
@@ -122,21 +113,33 @@ struct Model {
     return M::not_negative(open_v - t.battery_resistance_ohm * draw_a - sag_v);
   }
 
-  // Motor, bridge, gear and rolling of both sides (2.11). roll_n: rolling resistance of a side.
-  TWIN_INLINE Sides sides(const P& current_a, const P& bridge_sign, const P& rim_m_s, const Loads& load,
-                          const N& supply_v, const N& roll_n) const {
+  // All that has a sign with a soft middle, v / root(v^2 + v_s^2): 0.71 at v = v_s, 0.995 at 10 v_s. All of it has
+  // one quotient, which does not wait for the roots: v / root(a) is v root(a) b / (a b), and a factor of what friction
+  // falls by, 1 / (1 + (v / v_stribeck)^2), stands below the line too. roll_n: rolling resistance of a side.
+  TWIN_INLINE Friction friction(const P& current_a, const P& rim_m_s, const P& slide_m_s,
+                                const N& roll_n) const {
+    const P bridge2 = current_a * current_a + t.bridge_smoothing2_a2;
+    const P slide2 = slide_m_s * slide_m_s + t.floor_smoothing2_m2_s2;
+    const P rim2 = rim_m_s * rim_m_s, roll2 = rim2 + t.floor_smoothing2_m2_s2;
+    const P stribeck2 = rim2 + t.stribeck2_m2_s2;
+    const P others2 = bridge2 * slide2, dry2 = roll2 * stribeck2;
+    const P per_all = M::inverse(dry2 * others2);
     // Gear loss is friction in proportion to load: eta_g k_t N i when driving, as printed, and no
     // gain of energy when the wheel drives the motor, where eta_g would have to divide.
-    const P dry_n = (t.coulomb_n + roll_n) + t.loss_n_a * M::magnitude(current_a);
-    // soft sign (dry + stribeck / (1 + (v / v_stribeck)^2)), with one quotient that does not wait for the root
-    const P rim2 = rim_m_s * rim_m_s;
-    const P soft2 = rim2 + t.floor_smoothing2_m2_s2, stribeck2 = rim2 + t.stribeck2_m2_s2;
-    const P share = (dry_n * stribeck2 + t.stribeck_n_m2_s2) * M::inverse(soft2 * stribeck2);
-    const P friction_n = rim_m_s * M::root(soft2) * share;
+    const P steady_n = (t.coulomb_n + roll_n) + t.loss_n_a * M::magnitude(current_a);
+    const P dry_n = steady_n * stribeck2 + t.stribeck_n_m2_s2;  // times stribeck2
+    return {current_a * slide2 * dry2 * M::root(bridge2) * per_all,
+            slide_m_s * bridge2 * dry2 * M::root(slide2) * per_all,
+            rim_m_s * dry_n * others2 * M::root(roll2) * per_all};
+  }
+
+  // Motor, bridge and gear of both sides (2.11).
+  TWIN_INLINE Sides sides(const P& current_a, const P& rim_m_s, const Friction& f, const Loads& load,
+                          const N& supply_v) const {
     Sides out;
     out.current_dot = t.per_inductance * (duty * supply_v - t.emf_v_s_m * rim_m_s -
-                                          t.resistance_ohm * current_a - t.bridge_drop_v * bridge_sign);
-    out.rim_n = t.drive_n_a * current_a - t.viscous_n_s_m * rim_m_s - friction_n;
+                                          t.resistance_ohm * current_a - t.bridge_drop_v * f.bridge_sign);
+    out.rim_n = t.drive_n_a * current_a - t.viscous_n_s_m * rim_m_s - f.dry_n;
     if constexpr (!kPlain) {
       const P omega_rad_s = rim_m_s * t.per_radius;
       const P brake_n_m = M::brakes(M::pair(load[kBrakeLeft], load[kBrakeRight]), omega_rad_s,
@@ -157,18 +160,15 @@ struct Model {
     // Weight along the floor, body frame, small-angle floor (loads on the axles unchanged).
     const N gx = -kGravity * load[kSlopeX], gy = -kGravity * load[kSlopeY];
     const N gravity[2] = {c * gx + s * gy, c * gy - s * gx};
-    const N roll_n = kPlain ? t.roll_n : grip(load) * t.roll_n;
+    const N roll_n = kPlain ? t.roll_n : lifted ? N{} : grip(load) * t.roll_n;
+    const P slide_m_s = rolls() ? M::pair(t.front_arm_m, -t.rear_arm_m) * w : M::pair(N{}, N{});
 
-    Sides both;
+    const Friction f = friction(x[kCurrent], rim_m_s, slide_m_s, roll_n);
+    const Sides both = sides(x[kCurrent], rim_m_s, f, load, supply_v);
     Acceleration acc;
     if (rolls()) {
-      const P slide_m_s = M::pair(t.front_arm_m, -t.rear_arm_m) * w;
-      const Signs signs = soft_signs(x[kCurrent], t.bridge_smoothing2_a2, slide_m_s, t.floor_smoothing2_m2_s2);
-      both = sides(x[kCurrent], signs.first, rim_m_s, load, supply_v, roll_n);
-      acc = constrained(x, both, signs.second, load, gravity);
+      acc = constrained(x, both, f.slide_sign, load, gravity);
     } else if constexpr (kActs == Acts::kAll) {
-      const P bridge_sign = soft_sign(x[kCurrent], t.bridge_smoothing2_a2);
-      both = sides(x[kCurrent], bridge_sign, rim_m_s, load, supply_v, lifted ? N{} : roll_n);
       acc = lifted ? hanging(both) : slipping(x, both, load, gravity);
     }
     State out;
