@@ -147,7 +147,9 @@ def make_step(f: Functions, made: Callable[[Any], Any] = _as_it_is) -> Step:  # 
 
     side = made(side)
 
-    def motor(p: Numbers, amps: Any, sign: Any, rim: Any, dry: Any, duty: Any, supply_v: Any) -> Any:
+    def motor(
+        p: Numbers, amps: Any, sign: Any, rim: Any, dry: Any, duty: Any, supply_v: Any
+    ) -> Any:
         """Return rate of the current (A/s) and force at the rim (N) of one side."""
         left_v = (
             duty * supply_v - p.emf_v_s_m * rim - p.resistance_ohm * amps - p.bridge_drop_v * sign
@@ -166,7 +168,9 @@ def make_step(f: Functions, made: Callable[[Any], Any] = _as_it_is) -> Step:  # 
         left_sign, front_sign, left_dry = side(p, left_a, left_v, p.front_arm_m * turn)
         right_sign, rear_sign, right_dry = side(p, right_a, right_v, -p.rear_arm_m * turn)
         left_rate, left_n = motor(p, left_a, left_sign, left_v, left_dry, duty_left, supply_v)
-        right_rate, right_n = motor(p, right_a, right_sign, right_v, right_dry, duty_right, supply_v)
+        right_rate, right_n = motor(
+            p, right_a, right_sign, right_v, right_dry, duty_right, supply_v
+        )
         scrub_n_m = p.front_scrub_n_m * front_sign - p.rear_scrub_n_m * rear_sign
         turn_n_m = p.mass_arm_kg_m * (eta1 * turn) - scrub_n_m
         moment = p.half_track_m * (right_n - left_n) + turn_n_m

@@ -16,7 +16,8 @@ constexpr Word kPerQuarter[20] = {
     0x9c845f8bbdf9283b, 0x1ff897ffde05980f, 0xef2f118b5a0a6d1f, 0x6d367ecf27cb09b7, 0x4f463f669e5fea2d,
     0x7527bac7ebe5f17b, 0x3d0739f78a5292ea, 0x6bfb5fb11f8d5d08, 0x56033046fc7b6bab, 0xf0cfbc209af4361d};
 constexpr Word kEighth[2] = {0xc90fdaa22168c234, 0xc4c6628b80dc1cd1};  // pi / 4, behind the point
-constexpr int kWords = 4;  // that a product keeps: 256 bits, of which an angle's own and leading zeros take 120
+constexpr int kWords =
+    4;  // that a product keeps: 256 bits, of which an angle's own and leading zeros take 120
 
 // 64 bits of 2 / pi from that bit on.
 Word bits_from(int bit) {

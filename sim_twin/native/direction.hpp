@@ -102,9 +102,9 @@ struct Directions {
   static constexpr double kSixth = 10923.0 / 65536.0;  // 14 bits of it
   // (sin x / x - 1) / x^2 to 2^-68 x^-2, with kSixth taken off, and (cos x - 1 + x^2 / 2) / x^4 to 2^-64 x^-4: the
   // least largest error up to x = pi / 4 (Remez).
-  static constexpr double kSin[7] = {0x1.5555555555555p-18,
-                                     0x1.111111111110bp-7,  -0x1.a01a01a018ab4p-13, 0x1.71de3a53357d8p-19,
-                                     -0x1.ae645293042e3p-26, 0x1.61208f4ab8acfp-33, -0x1.aaa38cd211715p-41};
+  static constexpr double kSin[7] = {0x1.5555555555555p-18, 0x1.111111111110bp-7,   -0x1.a01a01a018ab4p-13,
+                                     0x1.71de3a53357d8p-19, -0x1.ae645293042e3p-26, 0x1.61208f4ab8acfp-33,
+                                     -0x1.aaa38cd211715p-41};
   static constexpr double kCos[6] = {0x1.555555555554cp-5,   -0x1.6c16c16c15142p-10, 0x1.a01a019cab9dep-16,
                                      -0x1.27e4f805531dep-22, 0x1.1ee9e8a6dd641p-29,  -0x1.8facdd3599f2fp-37};
 };

@@ -50,13 +50,14 @@ struct Model {
 
   using State = PairedState<P>;
   using Loads = typename M::Loads;  // by Load
-  struct Sides {    // left, right
-    P current_dot;  // A/s, one motor
-    P rim_n;        // what all motors of the side push the floor with, friction, load and rolling taken off
+  struct Sides {                    // left, right
+    P current_dot;                  // A/s, one motor
+    P rim_n;  // what all motors of the side push the floor with, friction, load and rolling taken off
   };
   struct Friction {
-    P bridge_sign, slide_sign;  // soft signs: of the currents (left, right), of the axles' sliding (front, rear)
-    P dry_n;                    // of motors, gears and rolling, at the rims
+    P bridge_sign,
+        slide_sign;  // soft signs: of the currents (left, right), of the axles' sliding (front, rear)
+    P dry_n;         // of motors, gears and rolling, at the rims
   };
   struct Acceleration {
     N eta1_dot, eta2_dot, theta_ddot;  // m/s^2, m/s^2, rad/s^2, body frame

@@ -1,4 +1,4 @@
-"""The plant's own cosine and sine: near the exact values, symmetric, and alike in every width of registers."""
+"""The plant's own cosine and sine: near the exact ones, symmetric, alike in every width of registers."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ KINDS = (
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_is_next_to_the_exact_value(kind: str):
-    """Against whole numbers of 1,300 bits, pi by Machin: no further than the bound, and mostly the nearest."""
+    """Against whole numbers of 1,300 bits, pi by Machin: within the bound, and mostly the nearest."""
     angles = drawn(3, kind)
     worst, nearest = 0.0, 0
     for angle, cos, sin in zip(angles, *directions(angles), strict=True):

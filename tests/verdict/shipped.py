@@ -46,7 +46,9 @@ def judged_anew(data, workers=1):
             return pool.map(jobs, lambda *_: None)
 
         yard = Yardstick.measured(field.tasks, make)
-        if any(not same(figures, data["yardstick"][task]) for task, figures in yard.figures.items()):
+        if any(
+            not same(figures, data["yardstick"][task]) for task, figures in yard.figures.items()
+        ):
             raise SystemExit("the yardstick is another one by now: make the verdict anew")
         found = shipped_scores(field, plan, yard, make) if then != now else {}
     rows = {law: found.get(law, data["shipped"].get(law)) for law in data["laws"]}
