@@ -8,7 +8,6 @@ all the same: its `outcome` is "fault".
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -21,6 +20,7 @@ from hil.config.deck import Deck, load_deck
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
 from hil.core.registries import OUTER_LAWS
+from hil.core.toml_text import toml_value
 from hil.record.reader import RunRecord, read_run
 
 if TYPE_CHECKING:
@@ -260,15 +260,12 @@ def _overrides(values: Mapping[str, Any]) -> list[str]:
 
 
 def _toml(key: str, value: Any) -> str:
-    if hasattr(value, "tolist"):  # NumPy's
-        value = value.tolist()
-    if isinstance(value, tuple):
-        value = list(value)
-    if not isinstance(value, str | bool | int | float | list):
+    try:
+        return toml_value(value)
+    except TypeError:
         raise BadInput(
-            f"{key} = {value!r}: a number, text, true or false, or a list of them is needed"
-        )
-    return json.dumps(value)  # of these, the text is the same in TOML
+            f"{key} = {value!r}: a number, text, true or false, or a list or table of them is needed"
+        ) from None
 
 
 def _unless_interrupted(record: RunRecord) -> Run:
