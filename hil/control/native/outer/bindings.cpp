@@ -180,7 +180,8 @@ void bind_laws(nb::module_& m) {
       "turned_axes",
       [](OuterLaw& law, double angle_rad, const outer::m::Pairs& more) -> Law {
         for (const auto& [x, y] : more) {
-          if (x >= outer::kTraceSlots || y >= outer::kTraceSlots) throw nb::value_error("no place of a trace");
+          if (x >= outer::kTraceSlots || y >= outer::kTraceSlots)
+            throw nb::value_error("no place of a trace");
         }
         auto out = std::make_unique<outer::TurnedAxes>(outer::AnyLaw{&law}, angle_rad);
         out->pairs.insert(out->pairs.end(), more.begin(), more.end());
