@@ -42,6 +42,8 @@ def replacing(path: Path) -> Iterator[Path]:
 
     After an error the half-written file is gone and `path` is as it was. Raises OSError.
     """
+    if not path.name:
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     part = path.with_name(f"{path.name}{PART}")
     try:
         yield part
