@@ -14,8 +14,6 @@ from pydantic import (
     Field,
     JsonValue,
     ModelWrapValidatorHandler,
-    ValidationInfo,
-    field_validator,
     model_validator,
 )
 from pydantic.fields import FieldInfo
@@ -49,16 +47,10 @@ class Section(BaseModel):
                     known = sorted(cls.model_fields)
                     near = difflib.get_close_matches(str(key), known, n=3, cutoff=0.5)
                     raise ValueError(f"unknown key {key!r}; near: {', '.join(near or known)}")
+                if isinstance(tree[key], bool) and "unit" in extra_of(cls.model_fields[key]):
+                    said = str(tree[key]).lower()
+                    raise ValueError(f"{key} = {said}: a number is needed, not true or false")
         return tree
-
-    @field_validator("*", mode="before")
-    @classmethod
-    def _refuse_truth_as_number(cls, value: Any, info: ValidationInfo) -> Any:
-        if isinstance(value, bool) and info.field_name is not None:
-            extra = extra_of(cls.model_fields[info.field_name])
-            if "unit" in extra:  # a quantity
-                raise ValueError("a number is needed, not true or false")
-        return value
 
     @classmethod
     def unit_of(cls, name: str, table: Mapping[str, Any]) -> str:  # noqa: ARG003 - of the whole table

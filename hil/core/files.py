@@ -152,8 +152,11 @@ def read_bounded(path: Path, limit_bytes: int = TEXT_BYTES) -> bytes:
 
 
 def read_text(path: Path, limit_bytes: int = TEXT_BYTES, encoding: str = "utf-8") -> str:
-    """Return a text file with plain line ends; raises BadInput, OSError, UnicodeDecodeError."""
-    text = read_bounded(path, limit_bytes).decode(encoding)
+    """Return a text file with plain line ends and no byte-order mark.
+
+    Raises BadInput, OSError, UnicodeDecodeError.
+    """
+    text = read_bounded(path, limit_bytes).decode(encoding).removeprefix("\ufeff")
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
