@@ -4,8 +4,9 @@ Their one source is Python: hil/control/native/outer/translate.py writes it as C
 are built, operation by operation. What is asked for here is given only where the native code is that of the
 objects it stands for: the sources are as they were translated, none of their functions and numbers has been
 replaced, and the objects are of these classes themselves with nothing of their own. Every other law runs in
-Python: one from elsewhere, a class derived from a built-in one, a block put around its parts. Native code
-asks it each tick. Where a source was just edited, or a function replaced, all of a run's ticks are Python's.
+Python: one from elsewhere, a class derived from a built-in one, one whose gains change on the way. Native
+code asks it each tick. Where a source was just edited, or a function replaced, all of a run's ticks are
+Python's.
 """
 
 from __future__ import annotations
@@ -22,13 +23,11 @@ from typing import Any
 
 from hil.control import AsgIsm as AsgBlock
 from hil.control import _outer
-from hil.control.laws.asg_ism import AsgIsm
 from hil.control.laws.axes import TurnedAxes
-from hil.control.laws.chain import Chain
 from hil.control.laws.guard import GuardedLaw
 from hil.control.laws.hold import HoldAtGoal
 from hil.control.laws.let_go import LetGo
-from hil.control.laws.state_feedback import StateFeedback
+from hil.control.laws.parts import WithoutFeedForward
 from hil.control.laws.turn_first import TurnFirst
 from hil.control.laws.within import WithinWheelSpeed
 from hil.control.references import Circle, Point, Stops, Waypoints
@@ -75,6 +74,9 @@ _FUNCTIONS = [
     if isinstance(function := getattr(value, "__wrapped__", value), FunctionType)
 ]
 _CODES = [function.__code__ for function in _FUNCTIONS]
+_CLASSES = {owner for owner in _owners() if isinstance(owner, type)}
+_LAWS = {kind for kind in _CLASSES if kind.__name__ in _outer.LAWS}
+_PLAIN = (float, int, bool, str, type(None), AsgBlock)
 
 
 @cache
@@ -147,7 +149,7 @@ def _law(law: Any, own_terms: tuple[str, ...], stand_in: StandIn | None = None) 
     if around is not None and _is_plain(law) and (kind is not TurnedAxes or _is_known(law)):
         return around(_law(law._law, own_terms, stand_in), law)
     if is_translated(law):
-        return _outer.law(kind.__name__, law._gains, law._limits, law._d0)
+        return _outer.law(kind.__name__, law._gains, law._limits, law._d0, **_block_parts(law))
     if stand_in is not None and kind is GuardedLaw and law.makes_batches:
         return stand_in(law)
     return _outer.python_law(law, own_terms)
@@ -162,11 +164,27 @@ def _is_known(law: Any) -> bool:
 
 def is_translated(law: Any) -> bool:
     """Say whether a law is one of those that are written as native code, itself and whole."""
-    kind = type(law)
-    if not (kind is StateFeedback or kind is AsgIsm) or not _is_plain(law):
-        return False
-    blocks = kind is StateFeedback or type(law._block) is AsgBlock
-    return blocks and type(law._chain) is Chain and _is_plain(law._chain)
+    return type(law) in _LAWS and _is_native(law)
+
+
+def _is_native(value: Any) -> bool:
+    """Say whether an object and all that it has are of classes that native code has, and hide nothing."""
+    kind = type(value)
+    if kind in _PLAIN:
+        return True
+    if kind is tuple:
+        return all(map(_is_native, value))
+    return kind in _CLASSES and _is_plain(value) and all(map(_is_native, vars(value).values()))
+
+
+def _block_parts(law: Any) -> dict[str, bool]:
+    """Return the parts that a law's sliding block leaves out."""
+    block = getattr(law, "_block", None)
+    return {
+        name: True
+        for name in ("without_kappa", "without_gamma")
+        if block is not None and getattr(block, name)
+    }
 
 
 def _geometry(law: Any) -> Any:
@@ -180,6 +198,7 @@ _AROUND: dict[type, Callable[[_outer.OuterLaw, Any], _outer.OuterLaw]] = {
         inner, _geometry(law), law._omega_max_rad_s
     ),
     TurnFirst: lambda inner, law: _outer.turn_first(inner, law._missing_rad_s),
+    WithoutFeedForward: lambda inner, _: _outer.without_feed_forward(inner),
     LetGo: lambda inner, law: _outer.let_go(inner, _geometry(law), law._least_rad_s),
 }
 

@@ -72,8 +72,7 @@ def make_drive(
     if forms is None:
         return None
     law, reference = forms
-    known = (*_outer.TRACE_KEYS, *parts.own_terms)
-    places = {key: place for place, key in enumerate(known)}
+    places = trace_places(parts.own_terms)
     return _native.Drive(
         pump=pump,
         watch=watch,
@@ -86,6 +85,12 @@ def make_drive(
         common=[places.get(str(key), -1) for key in TRACE_KEYS],
         own=[places.get(key, -1) for key in parts.own_terms],
     )
+
+
+def trace_places(own_terms: tuple[str, ...]) -> dict[str, int]:
+    """Return where in a trace native code has each name; one that translated laws have is theirs."""
+    known = [*_outer.TRACE_KEYS, *own_terms]
+    return {key: known.index(key) for key in known}
 
 
 def _left_to(

@@ -11,10 +11,8 @@ from hil.config.load import with_overrides
 from hil.control.laws.hold import HoldAtGoal
 from hil.control.laws.parts import (
     WithoutFeedForward,
-    WithoutGamma,
-    WithoutKappa,
     has_block,
-    replace_block,
+    leave_out,
 )
 from hil.core.errors import BadInput
 from hil.core.registries import ESTIMATORS, OUTER_LAWS
@@ -31,7 +29,7 @@ _BY_GAIN = {
     "integral": "ki_s4",
     "start": "zeta_start_m_s2",
 }
-_BY_BLOCK: Mapping[str, Any] = {"kappa": WithoutKappa, "gamma": WithoutGamma}
+_BY_BLOCK = ("kappa", "gamma")
 _BY_LIMIT: Mapping[str, Mapping[str, float | None]] = {
     "restrictions": {"approach_speed_m_s": None, "approach_accel_m_s2": None},
     "lead": {"lead_s": 0.0},
@@ -135,5 +133,5 @@ def _law_without(scenario: Scenario, outer: str, without: str) -> Any:
     if without == "feed-forward":
         law = WithoutFeedForward(law)
     else:
-        replace_block(law, _BY_BLOCK[without])
+        leave_out(law, without)
     return HoldAtGoal(law, control.limits) if entry.extra.get("hold", True) else law

@@ -71,10 +71,27 @@ T taken(nb::handle from) {
 
 nb::object pair(const outer::Vec2& v) { return nb::make_tuple(std::get<0>(v), std::get<1>(v)); }
 
-std::unique_ptr<OuterLaw> law_of(const std::string& name, nb::handle gains, nb::handle limits, double d0_m) {
+// A law on a sliding block is given one that leaves the same parts out; any other has none.
+template <typename Law, typename = void>
+struct Block {
+  static void leave_out(Law&, bool, bool) {}
+};
+template <typename Law>
+struct Block<Law, std::void_t<decltype(&Law::_block)>> {
+  static void leave_out(Law& law, bool kappa, bool gamma) { law._block.leave_out(kappa, gamma); }
+};
+
+template <typename Law, typename Gains>
+std::unique_ptr<OuterLaw> made(nb::handle gains, nb::handle limits, double d0_m, bool kappa, bool gamma) {
+  auto law = std::make_unique<Law>(taken<Gains>(gains), taken<outer::OuterLimits>(limits), d0_m);
+  Block<Law>::leave_out(*law, kappa, gamma);
+  return law;
+}
+
+std::unique_ptr<OuterLaw> law_of(const std::string& name, nb::handle gains, nb::handle limits, double d0_m,
+                                 bool kappa, bool gamma) {
 #define X(Law, Gains) \
-  if (name == #Law)   \
-    return std::make_unique<outer::Law>(taken<outer::Gains>(gains), taken<outer::OuterLimits>(limits), d0_m);
+  if (name == #Law) return made<outer::Law, outer::Gains>(gains, limits, d0_m, kappa, gamma);
   OUTER_LAWS(X)
 #undef X
   throw nb::key_error(("no law of the class " + name).c_str());
@@ -126,7 +143,12 @@ void bind_laws(nb::module_& m) {
         return std::make_unique<PythonLaw>(law, own);
       },
       "law"_a, "own"_a);
-  m.def("law", &law_of, "name"_a, "gains"_a, "limits"_a, "d0_m"_a);
+  m.def("law", &law_of, "name"_a, "gains"_a, "limits"_a, "d0_m"_a, nb::kw_only(), "without_kappa"_a = false,
+        "without_gamma"_a = false);
+  m.def(
+      "without_feed_forward",
+      [](OuterLaw& law) -> Law { return std::make_unique<outer::WithoutFeedForward>(outer::AnyLaw{&law}); },
+      nb::keep_alive<0, 1>(), "law"_a);
   m.def(
       "hold_at_goal",
       [](OuterLaw& law, double enter_m, double leave_m) -> Law {
@@ -212,10 +234,12 @@ NB_MODULE(_outer, m) {
         }
       },
       nullptr);
-  nb::list names, sources;
+  nb::list names, laws, sources;
   for (const char* key : outer::kTraceKeys) names.append(key);
   for (const auto& [path, hash] : outer::kSources) sources.append(nb::make_tuple(path, hash));
+  for (const char* law : outer::kLaws) laws.append(law);
   m.attr("TRACE_KEYS") = nb::tuple(names);
+  m.attr("LAWS") = nb::tuple(laws);
   m.attr("OWN_TERMS_MOST") = static_cast<int>(outer::kTraceSlots - outer::kTraceSize);
   m.attr("SOURCES") = nb::tuple(sources);
   bind_laws(m);
