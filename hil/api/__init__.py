@@ -8,8 +8,6 @@ all the same: its `outcome` is "fault".
 
 from __future__ import annotations
 
-import json
-import math
 import operator
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -23,6 +21,7 @@ from hil.config.deck import Deck, load_deck
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
 from hil.core.registries import OUTER_LAWS
+from hil.core.toml_text import toml_value
 from hil.record.reader import RunRecord, read_run
 
 if TYPE_CHECKING:
@@ -297,23 +296,12 @@ def _overrides(values: Mapping[str, Any]) -> list[str]:
 
 
 def _toml(key: str, value: Any) -> str:
-    """Return a value, also one of NumPy's, as TOML; raises BadInput."""
-    if hasattr(value, "tolist"):  # NumPy's
-        value = value.tolist()
-    if isinstance(value, os.PathLike):
-        value = os.fspath(value)
-    if isinstance(value, Mapping):
-        pairs = (f"{json.dumps(str(name))} = {_toml(key, item)}" for name, item in value.items())
-        return f"{{{', '.join(pairs)}}}"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(_toml(key, item) for item in value)}]"
-    if isinstance(value, float) and not math.isfinite(value):
-        return "nan" if math.isnan(value) else f"{'-' if value < 0 else ''}inf"
-    if not isinstance(value, str | bool | int | float):
+    try:
+        return toml_value(value)
+    except TypeError:
         raise BadInput(
             f"{key} = {value!r}: a number, text, true or false, or a list or table of them is needed"
-        )
-    return json.dumps(value)  # of these, the text is the same in TOML
+        ) from None
 
 
 def _unless_interrupted(record: RunRecord) -> Run:

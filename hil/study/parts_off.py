@@ -29,6 +29,8 @@ _BY_GAIN = {
     "integral": "ki_s4",
     "start": "zeta_start_m_s2",
 }
+# Gains that go to zero with it: what (2.9) adds to alpha is of the same term.
+_BESIDE = {"alpha": ("gamma0_m_s3", "gamma1_s3", "gamma2_s2")}
 _BY_BLOCK = ("kappa", "gamma")
 _BY_LIMIT: Mapping[str, Mapping[str, float | None]] = {
     "restrictions": {"approach_speed_m_s": None, "approach_accel_m_s2": None},
@@ -118,7 +120,10 @@ def _changed(scenario: Scenario, outer: str, without: str) -> Scenario:
         return with_overrides(scenario, [f"control.estimator={_BY_ESTIMATOR[without]}"])
     if without in _BY_GAIN:
         name = control.gain_set
-        gains = control.active_gains.with_values(OUTER_LAWS.get(outer), {_BY_GAIN[without]: 0.0})
+        entry = OUTER_LAWS.get(outer)
+        fields = entry.settings.model_fields if entry.settings is not None else {}
+        off = [_BY_GAIN[without], *(gain for gain in _BESIDE.get(without, ()) if gain in fields)]
+        gains = control.active_gains.with_values(entry, dict.fromkeys(off, 0.0))
         sets = control.gains.model_copy(update={name: gains})
         return scenario.model_copy(update={"control": control.model_copy(update={"gains": sets})})
     return scenario

@@ -100,6 +100,27 @@ def test_scenario_object_and_dotted_names() -> None:
     assert (changed.duration_s, changed.start.x_m) == (2.5, 0.5)
 
 
+def test_values_that_are_tables_or_any_text() -> None:
+    """What --set takes as TOML is given as Python: lists of tables, NumPy's numbers, any character."""
+    pushes = [{"target": "force_left_n", "shape": "step", "amplitude": np.int64(2), "end_s": None}]
+    scenario = hil.load_scenario(
+        "scenario-1",
+        disturbances=pushes,
+        reference={"kind": "circle", "radius_m": 0.4},
+        requirements=(),
+        name="robot \U0001f916",
+        description='a "quoted" \\ text \x7f',
+    )
+    (push,) = scenario.disturbances
+    assert (push.target, push.amplitude, push.end_s) == ("force_left_n", 2.0, None)
+    assert scenario.reference.kind == "circle"
+    assert scenario.requirements == ()
+    assert scenario.name == "robot \U0001f916"
+    assert scenario.description == 'a "quoted" \\ text \x7f'
+    with pytest.raises(hil.BadInput, match=r"duration_s = nan s: input should be a finite"):
+        hil.load_scenario("scenario-1", duration_s=float("nan"))
+
+
 def test_tables_have_units_and_no_values_where_there_are_none(records: dict[str, hil.Run]) -> None:
     """An Arrow table has the columns of the record with unit and meaning."""
     run = records["pid"]

@@ -96,6 +96,17 @@ def test_nothing_off_is_the_law_itself_and_a_part_off_is_not():
         opened_without(scenario, "pid", 3, "alpha")
 
 
+def test_without_alpha_there_is_no_sliding_term_whatever_it_is_made_of():
+    """F+ of (2.9) adds to alpha (4.14): with it the part that is off is the whole term."""
+    scenario = load_scenario("ahead", ["duration_s=2", "control.gains.tuned.asg_ism.gamma0_m_s3=4"])
+    off, on = figures_together(
+        [partial(opened_without, scenario, "asg-ism", 3, part) for part in ("alpha", "")]
+    )
+    assert on["sliding_term_share"] > 0.0
+    assert off["sliding_term_share"] == 0.0
+    assert off["iae_m_s"] != on["iae_m_s"]
+
+
 def test_a_part_that_helps_everywhere_is_found_and_one_that_does_nothing_is_not():
     """Made-up runs: without its lead the law is worse in every cell, without its hold it is the same."""
     cells = [f"task{i} in calm" for i in range(12)]
