@@ -19,11 +19,11 @@ namespace {
   const __m512d half = _mm512_set1_pd(0.5);
   const __m512d guess = _mm512_rsqrt14_pd(x);
   __m512d g = _mm512_mul_pd(x, guess), h = _mm512_mul_pd(half, guess);  // to sqrt(x), 0.5 / sqrt(x)
-  for (int i = 0; i < 2; ++i) {
-    const __m512d r = _mm512_fnmadd_pd(g, h, half);
-    g = _mm512_fmadd_pd(g, r, g);
-    h = _mm512_fmadd_pd(h, r, h);
-  }
+  // 1 / sqrt(1 - 2 r) = 1 + r + 3/2 r^2 + ..: from 14 bits to 40
+  const __m512d r = _mm512_fnmadd_pd(g, h, half);
+  const __m512d more = _mm512_fmadd_pd(_mm512_mul_pd(r, _mm512_set1_pd(1.5)), r, r);
+  g = _mm512_fmadd_pd(g, more, g);
+  h = _mm512_fmadd_pd(h, more, h);
   out = _mm512_fmadd_pd(_mm512_fnmadd_pd(g, g, x), h, g);
   const __m512d left = _mm512_abs_pd(_mm512_fnmadd_pd(out, out, x));
   const __mmask8 sure = _mm512_cmp_pd_mask(left, _mm512_mul_pd(out, scale(out, 52)), _CMP_LT_OQ);
