@@ -84,8 +84,29 @@ class LawFacts:
         return gain
 
 
+# A column that figures are given beside those of a record: what `law_ran` found.
+_RAN = "law ran"
+
+
+def with_ran(columns: Columns) -> Columns:
+    """Return a short table with what `law_ran` gives kept beside it, which several figures ask for."""
+    if not isinstance(columns, dict) or row_count(columns) > PIECE_ROWS:
+        return columns
+    ran = law_ran(columns)
+    ran.flags.writeable = False
+    return {**columns, _RAN: ran}
+
+
+def of_ran(columns: Columns) -> tuple[str, ...]:
+    """Return the names of the columns that `law_ran` reads."""
+    return (*RESTING, _RAN) if _RAN in columns else RESTING
+
+
 def law_ran(columns: Columns) -> NDArray[np.bool_]:
     """Return at which ticks the law ran: all but those in which the control stop commands rest."""
+    if _RAN in columns:
+        known: Any = columns[_RAN]
+        return np.asarray(known, np.bool_)
     resting: NDArray[np.bool_] = columns[RESTING[0]] == 0.0
     for name in RESTING[1:]:
         resting &= columns[name] == 0.0
@@ -110,7 +131,7 @@ def _disturbances(columns: Columns, who: str, d0_m: float) -> Iterator[Array]:
     half = max(round(HALF_SPAN_S / tick_s), 1)
     if row_count(columns) <= 4 * half:
         return
-    names = ["t_s", f"{who}_eta1_m_s", f"{who}_theta_dot_rad_s", *RESTING]
+    names = ["t_s", f"{who}_eta1_m_s", f"{who}_theta_dot_rad_s", *of_ran(columns)]
     for piece in pieces(columns, names, before=4 * half):
         eta1, w = piece[names[1]], piece[names[2]]
         if eta1.size > 4 * half:
@@ -164,14 +185,14 @@ def _least_gain(columns: Columns, facts: LawFacts) -> float:
         return float(facts.gain_m_s3({}))
     gains = (
         np.asarray(facts.gain_m_s3(piece))[law_ran(piece)]
-        for piece in pieces(columns, [*facts.gain_names, *RESTING])
+        for piece in pieces(columns, [*facts.gain_names, *of_ran(columns)])
     )
     return min((float(gain.min()) for gain in gains if gain.size), default=math.nan)
 
 
 def _layers(columns: Columns) -> Iterator[tuple[Array, Array, Array]]:
     """Yield time, ||s|| and eps of the ticks in which the law ran, piece by piece."""
-    for piece in pieces(columns, ["t_s", "s_x_m_s2", "s_y_m_s2", "eps_m_s2", *RESTING]):
+    for piece in pieces(columns, ["t_s", "s_x_m_s2", "s_y_m_s2", "eps_m_s2", *of_ran(columns)]):
         ran = law_ran(piece)
         s = np.hypot(piece["s_x_m_s2"], piece["s_y_m_s2"])
         yield piece["t_s"][ran], s[ran], piece["eps_m_s2"][ran]
@@ -211,7 +232,7 @@ def _share(columns: Columns, facts: LawFacts) -> float:
     (alpha + 2 F+) s/(||s|| + eps), or what the law's own columns say.
     """
     own = ["slide_x_m_s3", "slide_y_m_s3"] if "slide_x_m_s3" in columns else []
-    names = [*_OF_SHARE, *facts.gain_names, *own, *RESTING]
+    names = [*_OF_SHARE, *facts.gain_names, *own, *of_ran(columns)]
 
     short = row_count(columns) <= PIECE_ROWS  # a long run's are worked out anew each time
     kept = [_shares(piece, facts) for piece in pieces(columns, names)] if short else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,13 +13,15 @@ _PLAIN_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def toml_value(value: Any) -> str:
-    """Return a value as TOML: text, a number, true or false, a list or a table of them.
+    """Return a value as TOML: text, a path, a number, true or false, a list or a table of them.
 
     Keys of a table whose value is None are left out: TOML has no word for it. Raises TypeError for anything
     else.
     """
     if hasattr(value, "tolist"):  # NumPy's
         value = value.tolist()
+    if isinstance(value, os.PathLike):
+        value = os.fspath(value)
     if isinstance(value, str):
         # JSON leaves DEL as it is and writes what lies beyond 16 bits in halves; TOML takes neither.
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -49,8 +49,8 @@ namespace {
 }  // namespace
 
 #define TWIN_ROOT(v) _mm512_sqrt_pd(v)
-#define TWIN_OVER_ROOT proven_over_root
 #define TWIN_LANES 8
 #define TWIN_RUN run_eight
+#define TWIN_DIRECT direct_eight
 #include "lane_run.hpp"
 #endif
