@@ -23,9 +23,16 @@ class OuterLaw:
     def reset(self, reference: ReferenceState, estimate: Estimate) -> None:
         """Start anew."""
     def step(
-        self, reference: ReferenceState, estimate: Estimate, dt_s: float
+        self,
+        reference: ReferenceState,
+        estimate: Estimate,
+        dt_s: float,
+        own: tuple[str, ...] = ...,
     ) -> tuple[float, float, dict[str, float]]:
-        """Return forward speed in m/s, turn rate in rad/s and the trace, NaN for what it does not have."""
+        """Return forward speed in m/s, turn rate in rad/s and the trace, NaN for what it does not have.
+
+        `own` are the names that `python_law` was given.
+        """
 
 class Reference:
     """A desired motion of the flat output."""
@@ -53,7 +60,9 @@ def python_law(law: Any, own: tuple[str, ...]) -> OuterLaw:
 def without_feed_forward(law: OuterLaw) -> OuterLaw: ...
 def hold_at_goal(law: OuterLaw, enter_m: float, leave_m: float) -> OuterLaw: ...
 def within_wheel_speed(law: OuterLaw, geometry: Any, omega_max_rad_s: float) -> OuterLaw: ...
-def turned_axes(law: OuterLaw, angle_rad: float) -> OuterLaw: ...
+def turned_axes(law: OuterLaw, angle_rad: float, more: list[tuple[int, int]]) -> OuterLaw:
+    """Return the law in its axes; `more` are places of X and Y in its trace besides those of TRACE_KEYS."""
+
 def turn_first(law: OuterLaw, missing_rad_s: float | None) -> OuterLaw: ...
 def let_go(law: OuterLaw, geometry: Any, least_rad_s: float | None) -> OuterLaw: ...
 def point(state: ReferenceState) -> Reference: ...

@@ -23,6 +23,7 @@ from typing import Any
 
 from hil.control import AsgIsm as AsgBlock
 from hil.control import _outer
+from hil.control.laws import axes
 from hil.control.laws.axes import TurnedAxes
 from hil.control.laws.guard import GuardedLaw
 from hil.control.laws.hold import HoldAtGoal
@@ -146,8 +147,10 @@ def native_law(law: object, own_terms: tuple[str, ...] = ()) -> _outer.OuterLaw 
 def _law(law: Any, own_terms: tuple[str, ...], stand_in: StandIn | None = None) -> _outer.OuterLaw:
     kind = type(law)
     around = _AROUND.get(kind)
-    if around is not None and _is_plain(law) and (kind is not TurnedAxes or _is_known(law)):
+    if around is not None and _is_plain(law):
         return around(_law(law._law, own_terms, stand_in), law)
+    if kind is TurnedAxes and _is_plain(law) and (more := _own_vectors(own_terms)) is not None:
+        return _outer.turned_axes(_law(law._law, own_terms, stand_in), law._angle_rad, more)
     if is_translated(law):
         return _outer.law(kind.__name__, law._gains, law._limits, law._d0, **_block_parts(law))
     if stand_in is not None and kind is GuardedLaw and law.makes_batches:
@@ -155,11 +158,26 @@ def _law(law: Any, own_terms: tuple[str, ...], stand_in: StandIn | None = None) 
     return _outer.python_law(law, own_terms)
 
 
-def _is_known(law: Any) -> bool:
-    """Say whether axes are turned for a translated law: another's own terms are turned in Python."""
-    while type(law) in _AROUND:
-        law = law._law
-    return is_translated(law)
+def trace_places(own_terms: tuple[str, ...]) -> dict[str, int]:
+    """Return where in a trace native code has each name; one that translated laws have is theirs."""
+    known = [*_outer.TRACE_KEYS, *own_terms]
+    return {key: known.index(key) for key in known}
+
+
+@cache
+def _own_vectors(own_terms: tuple[str, ...]) -> list[tuple[int, int]] | None:
+    """Return places of X and Y of vectors that are a law's own.
+
+    None where X or Y of one may be a name that is not kept: such axes are turned in Python.
+    """
+    places = trace_places(own_terms)
+    pairs = axes._pairs(tuple(places))
+    paired = [name for pair in pairs for name in pair]
+    own = places.keys() - set(_outer.TRACE_KEYS)
+    alone = any(axes.is_of_a_vector(name) for name in own - set(paired))
+    if alone or len(set(paired)) < len(paired):
+        return None
+    return [(places[x], places[y]) for x, y in pairs if {x, y} & own]
 
 
 def is_translated(law: Any) -> bool:
@@ -192,7 +210,6 @@ def _geometry(law: Any) -> Any:
 
 
 _AROUND: dict[type, Callable[[_outer.OuterLaw, Any], _outer.OuterLaw]] = {
-    TurnedAxes: lambda inner, law: _outer.turned_axes(inner, law._angle_rad),
     HoldAtGoal: lambda inner, law: _outer.hold_at_goal(inner, law._enter, law._leave),
     WithinWheelSpeed: lambda inner, law: _outer.within_wheel_speed(
         inner, _geometry(law), law._omega_max_rad_s

@@ -11,9 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from hil.control import _outer
 from hil.control.estimators.geometry import BelievedGeometry
-from hil.control.translated import native_forms
+from hil.control.translated import native_forms, trace_places
 from hil.record.memory import MemoryRecorder
 from hil.record.schema import TRACE_KEYS
 from hil.runs import _native
@@ -85,12 +84,6 @@ def make_drive(
         common=[places.get(str(key), -1) for key in TRACE_KEYS],
         own=[places.get(key, -1) for key in parts.own_terms],
     )
-
-
-def trace_places(own_terms: tuple[str, ...]) -> dict[str, int]:
-    """Return where in a trace native code has each name; one that translated laws have is theirs."""
-    known = [*_outer.TRACE_KEYS, *own_terms]
-    return {key: known.index(key) for key in known}
 
 
 def _left_to(

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hil.control.laws.guarded_batch import GuardedBatch, batches
+from hil.control.translated import trace_places
 from hil.core.batch import ROWS
 from hil.core.errors import RigFault
 from hil.record.reader import RunRecord
 from hil.runs import _native
-from hil.runs.driving import trace_places
 from hil.runs.execute import InMemory
 
 if TYPE_CHECKING:

@@ -93,7 +93,7 @@ class Scope:
                 ),
                 body=body,
             ) if pairs == self._program.pairs:
-                yield f"for (const auto& [{one}, {other}] : k_pairs) {{"
+                yield f"for (const auto& [{one}, {other}] : this->pairs) {{"
                 yield f"  if (!{trace}.has({one}) || !{trace}.has({other})) continue;"
                 yield from (line.removeprefix(indent) for line in self.block(body, indent + "  "))
                 yield "}"

@@ -231,6 +231,8 @@ class Translation:
         yield from self._methods(parts)
         for member, kind in parts.members:
             yield f"  {kind} {member}{'' if member in parts.started else '{}'};"
+        if self.program.pairs:  # of translated laws; whoever knows more names adds theirs
+            yield "  m::Pairs pairs{std::begin(k_pairs), std::end(k_pairs)};"
         yield "};"
         signature = self.program.functions[name]
         if signature.names == ["gains", "limits", "d0_m"]:

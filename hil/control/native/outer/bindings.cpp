@@ -1,5 +1,6 @@
 // Python module hil.control._outer; meaning and units for Python readers: hil/control/_outer.pyi.
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/unique_ptr.h>
 #include <nanobind/stl/vector.h>
@@ -126,16 +127,19 @@ void bind_laws(nb::module_& m) {
           "reference"_a, "estimate"_a)
       .def(
           "step",
-          [](OuterLaw& law, nb::handle reference, nb::handle estimate, double dt_s) {
+          [](OuterLaw& law, nb::handle reference, nb::handle estimate, double dt_s, const nb::tuple& own) {
             const outer::OuterCommand out =
                 law.step(taken<ReferenceState>(reference), taken<Estimate>(estimate), dt_s);
             nb::dict trace;
             for (std::size_t key = 0; key < outer::kTraceSize; ++key) {
               trace[outer::kTraceKeys[key]] = out.trace.get(key);
             }
+            for (std::size_t i = 0; i < own.size() && outer::kTraceSize + i < outer::kTraceSlots; ++i) {
+              trace[own[i]] = out.trace.get(outer::kTraceSize + i);
+            }
             return nb::make_tuple(out.eta1_m_s, out.theta_dot_rad_s, trace);
           },
-          "reference"_a, "estimate"_a, "dt_s"_a);
+          "reference"_a, "estimate"_a, "dt_s"_a, "own"_a = nb::tuple());
   using Law = std::unique_ptr<OuterLaw>;
   m.def(
       "python_law",
@@ -174,10 +178,16 @@ void bind_laws(nb::module_& m) {
       nb::keep_alive<0, 1>(), "law"_a, "missing_rad_s"_a.none());
   m.def(
       "turned_axes",
-      [](OuterLaw& law, double angle_rad) -> Law {
-        return std::make_unique<outer::TurnedAxes>(outer::AnyLaw{&law}, angle_rad);
+      [](OuterLaw& law, double angle_rad, const outer::m::Pairs& more) -> Law {
+        for (const auto& [x, y] : more) {
+          if (x >= outer::kTraceSlots || y >= outer::kTraceSlots)
+            throw nb::value_error("no place of a trace");
+        }
+        auto out = std::make_unique<outer::TurnedAxes>(outer::AnyLaw{&law}, angle_rad);
+        out->pairs.insert(out->pairs.end(), more.begin(), more.end());
+        return out;
       },
-      nb::keep_alive<0, 1>(), "law"_a, "angle_rad"_a);
+      nb::keep_alive<0, 1>(), "law"_a, "angle_rad"_a, "more"_a);
   m.def(
       "let_go",
       [](OuterLaw& law, nb::handle geometry, nb::handle least_rad_s) -> Law {

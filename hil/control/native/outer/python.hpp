@@ -32,6 +32,7 @@ class PythonError : public std::runtime_error {
 namespace m {
 
 struct None {};
+using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;  // places in a trace
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double inf = std::numeric_limits<double>::infinity();
