@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hil.board.wheel_laws import WHEEL_LAWS
+from hil.cli.streams import takes_every_letter
 from hil.core.errors import BadInput
 
 if TYPE_CHECKING:
@@ -127,7 +129,8 @@ def tell(text: str) -> None:
 
 def print_json(document: dict[str, Any]) -> None:
     """Write one JSON document to stdout."""
-    click.echo(json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False))
+    plain = not takes_every_letter(sys.stdout)
+    click.echo(json.dumps(document, indent=1, ensure_ascii=plain, allow_nan=False))
 
 
 def warn_unfinished(scenarios: Iterable[Scenario]) -> None:

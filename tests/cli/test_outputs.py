@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import os
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -118,3 +123,24 @@ def test_a_file_of_windows_notepad_is_read(tmp_path: Path, monkeypatch: pytest.M
 def test_true_is_no_number(tmp_path: Path, change: str) -> None:
     """It was taken for 1."""
     assert "a number is needed" in run_pose("--set", change, "--out", tmp_path / "run").refusal
+
+
+@pytest.mark.parametrize("coding", ["ascii", "cp1252"])
+def test_a_locale_without_greek_letters_loses_no_answer(
+    runs: tuple[Path, Path], tmp_path: Path, coding: str
+) -> None:
+    """The table has a delta, and the JSON is JSON: as on a pipe of Windows."""
+    named = tmp_path / "Läufe" / "run"
+    shutil.copytree(runs[0], named)
+    where = os.environ | {"PYTHONIOENCODING": coding, "PYTHONUTF8": "0"}
+    table, document = (
+        subprocess.run(
+            [sys.executable, "-m", "hil", "compare", named, runs[1], *more],
+            capture_output=True, env=where, check=False,
+        )
+        for more in ((), ("--json",))
+    )  # fmt: skip
+    assert (table.returncode, table.stderr) == (1, b"")
+    assert b"\\u03b4" in table.stdout
+    assert document.returncode == 1
+    assert str(named) in json.dumps(json.loads(document.stdout.decode(coding)), ensure_ascii=False)
