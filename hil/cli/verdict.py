@@ -62,7 +62,7 @@ def command(
     Searches see one half of the deck's tasks and conditions, the verdict is spoken on the other half
     (docs/verdict.md). Every law gets the same budget. Laws are compared at equal calm: how accurate
     each is at the same variation of commands and PWM. With several seeds of the search, a difference
-    that one of them does not show is no difference shown.
+    that one of them does not show is no difference shown. With --outer PID is judged beside the laws named.
 
     The data are written after each seed of the search, so that an early end leaves those.
 

@@ -89,7 +89,7 @@ class Tasks:
     @property
     def trees(self) -> dict[str, Any]:
         """Return every resolved value of the scenarios."""
-        return {name: task.model_dump(mode="json") for name, task in self.scenarios.items()}
+        return _trees(self.scenarios)
 
     def cases(self) -> tuple[Case, ...]:
         """Return the runs of a candidate: the usual ones, or each task in all its variants.
@@ -112,6 +112,10 @@ class Tasks:
                 for j, variant in enumerate(variants)
             ]
         return tuple(found)
+
+
+def _trees(scenarios: Mapping[str, Scenario]) -> dict[str, Any]:
+    return {name: task.model_dump(mode="json") for name, task in scenarios.items()}
 
 
 def load_tasks(names: Sequence[str], robot: str | None, overrides: Sequence[str] = ()) -> Tasks:
@@ -279,7 +283,7 @@ def identity_of(
         "seed": plan.search_seed,
         "seeds": list(plan.seeds),
         "population": plan.population,
-        "tasks": _digest([only_gains_of(tree, laws) for tree in tasks.trees.values()]),
+        "tasks": _digest([only_gains_of(tree, laws) for tree in _trees(tasks.known).values()]),
         "gains kept": _digest(_tables_of(tasks.base, laws)),
         "procedure": _digest(searched),
         "program": program,

@@ -1,6 +1,6 @@
 // The steps of one width, compiled for the processors that have it: a unit defines TWIN_LANES (robots side by
-// side), TWIN_ROOT (square roots of a register), TWIN_RUN and TWIN_DIRECT (the functions' names), and takes this in.
-// All but those functions belongs to the unit alone.
+// side), TWIN_ROOT (square roots of a register), TWIN_PROVEN_ROOT where it has another way to them that may fail,
+// TWIN_RUN and TWIN_DIRECT (the functions' names), and takes this in. All but those functions belongs to the unit alone.
 #include <cmath>
 #include <cstring>
 
@@ -54,7 +54,16 @@ struct Many {
   TWIN_INLINE static Bits bits_of(const V& v) { return (Bits)v; }
   TWIN_INLINE static V number_of(const Bits& bits) { return (V)bits; }
   TWIN_INLINE static V root(const V& v) { return TWIN_ROOT(v); }
-  TWIN_INLINE static Two root(const Two& v) { return {{TWIN_ROOT(v.v[0]), TWIN_ROOT(v.v[1])}}; }
+  // Where there is another way than the divider, one half goes each way.
+  TWIN_INLINE static Two root(const Two& v) {
+#ifdef TWIN_PROVEN_ROOT
+    Two out;
+    const bool sure = TWIN_PROVEN_ROOT(v.v[1], out.v[1]);
+    out.v[0] = TWIN_ROOT(v.v[0]);
+    if (__builtin_expect(sure, true)) return out;
+#endif
+    return {{TWIN_ROOT(v.v[0]), TWIN_ROOT(v.v[1])}};
+  }
   TWIN_INLINE static Two inverse(const Two& v) { return 1.0 / v; }
   TWIN_INLINE static V magnitude(const V& v) {
     const Mask rest = (Mask)(V{} - 0.0) | 0x7fffffffffffffffLL;
