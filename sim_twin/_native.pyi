@@ -185,6 +185,11 @@ def plant_lane_time(params: PlantParams, lanes: int, runs: int, steps: int) -> f
     Without boards and encoders; `runs` is a multiple of `lanes`, which is one of `lane_widths`.
     """
 
+def directions(
+    angle_rad: NDArray[np.float64], lanes: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return cosines and sines of the angles as a step of the plant has them, `lanes` side by side."""
+
 def advance_together(
     kernels: Sequence[Kernel], t_us: Sequence[int], lanes: int = 0
 ) -> list[tuple[int | str, int]]:

@@ -55,7 +55,7 @@ def variation(columns: Columns, name: str) -> float:
 def sign_changes(columns: Columns, name: str) -> int:
     """Count the changes of sign while the law ran, passing over zeros and unknown values."""
     count, before = 0, np.empty(0)
-    for piece in pieces(columns, [name, *sliding.RESTING]):
+    for piece in pieces(columns, [name, *sliding.of_ran(columns)]):
         values = piece[name][sliding.law_ran(piece)]
         signs = np.sign(values[np.isfinite(values) & (values != 0.0)])
         signs = np.concatenate((before, signs))
@@ -67,7 +67,7 @@ def sign_changes(columns: Columns, name: str) -> int:
 def mean_while_ran(columns: Columns, name: str) -> float:
     """Return the mean of the known values while the law ran."""
     sums, count = [], 0
-    for piece in pieces(columns, [name, *sliding.RESTING]):
+    for piece in pieces(columns, [name, *sliding.of_ran(columns)]):
         values = piece[name][sliding.law_ran(piece)]
         known = values[np.isfinite(values)]
         sums.append(known.sum())

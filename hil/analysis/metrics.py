@@ -143,7 +143,7 @@ def compute(
         raise BadInput(f"run record: {rows} rows of samples, the figures need at least 2")
     true_error = has_truth(columns)
     who, names = "true" if true_error else "est", _names_of_error(true=true_error)
-    span_s = ends(columns, "t_s")
+    span_s, columns = ends(columns, "t_s"), sliding.with_ran(columns)
     with np.errstate(over="ignore", invalid="ignore"):  # of a damaged record: they are inf or NaN
         values = (
             _error_figures(columns, names, span_s)
@@ -309,7 +309,7 @@ def _effort_figures(columns: Columns) -> dict[str, float]:
 def _sliding_figures(columns: Columns, start_s: float) -> dict[str, float]:
     changes = sign_changes(columns, "s_x_m_s2") + sign_changes(columns, "s_y_m_s2")
     ran_s, known, reached_s = [], False, math.nan
-    for piece in pieces(columns, ["t_s", "in_layer", *sliding.RESTING], before=1):
+    for piece in pieces(columns, ["t_s", "in_layer", *sliding.of_ran(columns)], before=1):
         t_s, inside = piece["t_s"], piece["in_layer"]
         ran_s.append(np.diff(t_s)[sliding.law_ran(piece)[:-1]].sum())
         known = known or bool(np.isfinite(inside).any())
@@ -341,7 +341,7 @@ def _timing_figures(columns: Columns, link: LinkStats) -> dict[str, float]:
 def _control_energy(columns: Columns) -> float:
     """Integrate |u|²; NaN for a law that ran and never gave its u, whatever the control stop gave."""
     ran, told = False, False
-    for piece in pieces(columns, list(sliding.RESTING)):
+    for piece in pieces(columns, sliding.of_ran(columns)):
         mine = sliding.law_ran(piece)
         ran = ran or bool(mine.any())
         told = told or bool(np.isfinite(piece["zeta_m_s2"][mine] + piece["u2_m_s2"][mine]).any())

@@ -137,6 +137,8 @@ def power(effect: float, pairs: int) -> float:
     """
     if pairs < 2:
         return 0.0
+    if abs(effect) > MOST_EFFECT:
+        return 1.0
     edge = float(scipy.stats.t.ppf(0.5 + 0.5 * CONFIDENCE, pairs - 1))
     shift = abs(effect) * math.sqrt(pairs)
     above = float(scipy.stats.nct.sf(edge, pairs - 1, shift))
@@ -145,16 +147,22 @@ def power(effect: float, pairs: int) -> float:
 
 
 MOST_PAIRS = 10_000_000
+# Two pairs show as many standard deviations in all but one of a thousand studies; SciPy tells no more.
+MOST_EFFECT = 1e4
 
 
 def pairs_needed(difference: float, sd: float, wanted: float = 0.8) -> int:
     """Return the least pairs that show a mean difference with probability `wanted`; raises BadInput."""
-    if not (difference and math.isfinite(difference) and sd > 0.0 and 0.05 < wanted < 1.0):
+    if not (
+        difference and math.isfinite(difference) and 0.0 < sd < math.inf and 0.05 < wanted < 1.0
+    ):
         raise BadInput(
             f"difference = {difference:g}, sd = {sd:g}, power = {wanted:g}: needs a difference other "
             "than 0, an sd above 0 (of the paired differences) and a power between 0.05 and 1"
         )
     effect = abs(difference) / sd
+    if effect > MOST_EFFECT:
+        return 2
     normal = (scipy.stats.norm.ppf(0.5 + 0.5 * CONFIDENCE) + scipy.stats.norm.ppf(wanted)) / effect
     if normal**2 > MOST_PAIRS:
         raise BadInput(f"difference = {difference:g}: needs more than {MOST_PAIRS:,} pairs")

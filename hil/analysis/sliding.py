@@ -37,33 +37,76 @@ IN_LAYER_SHARE = 0.99
 # A command of the control stop: the law did not run in this tick.
 RESTING = ("v1_m_s3", "u2_m_s2", "zeta_m_s2", "eta1_cmd_m_s", "theta_dot_cmd_rad_s")
 
+_GAMMAS = ("gamma0_m_s3", "gamma1_s3", "gamma2_s2")
+_FROM_GOAL, _SPEED = ("delta1_x_m", "delta1_y_m"), ("z2_x_m_s", "z2_y_m_s")
+
 
 @dataclass(frozen=True, slots=True)
 class LawFacts:
     """What the figures need to know of a law beside its columns; NaN where it has no such thing.
 
-    `alpha_m_s3` is the gain of its sliding term, `d0_m` the offset of the flat output as believed,
-    `accel_max_m_s2` the limit on zeta.
+    `alpha_m_s3` is the gain of its sliding term, to which 2 F+ of (2.9) is added: `gammas` are the value of
+    F+ (m/s^3), and what it has per distance from the goal (1/s^3) and per speed (1/s^2). `d0_m` is the
+    offset of the flat output as believed, `accel_max_m_s2` the limit on zeta.
     """
 
     alpha_m_s3: float = math.nan
     d0_m: float = math.nan
     accel_max_m_s2: float = math.nan
+    gammas: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @classmethod
     def of(cls, gains: Mapping[str, Any], scenario: Mapping[str, Any]) -> LawFacts:
         """Return the facts of a law's gains and a resolved scenario, as a manifest holds them."""
-        alpha = gains.get("outer", {}).get("alpha_m_s3")
+        outer = gains.get("outer", {})
+        alpha = outer.get("alpha_m_s3")
         limits = scenario.get("control", {}).get("limits", {})
         return cls(
             math.nan if alpha is None else float(alpha),
             float(scenario.get("robot", {}).get("d0_m", math.nan)),
             float(limits.get("zeta_max_m_s2", math.nan)),
+            tuple(float(outer.get(name) or 0.0) for name in _GAMMAS),  # type: ignore[arg-type]
         )
+
+    @property
+    def gain_names(self) -> tuple[str, ...]:
+        """Return the columns that the gain of the sliding term varies with."""
+        _, by_distance, by_speed = self.gammas
+        return (*(_FROM_GOAL if by_distance else ()), *(_SPEED if by_speed else ()))
+
+    def gain_m_s3(self, columns: Columns) -> Array | float:
+        """Return the gain of the sliding term, at each tick where it varies."""
+        constant, by_distance, by_speed = self.gammas
+        gain: Array | float = self.alpha_m_s3 + 2.0 * constant
+        for share, names in ((by_distance, _FROM_GOAL), (by_speed, _SPEED)):
+            if share:
+                gain = gain + 2.0 * share * np.hypot(*(columns[name] for name in names))
+        return gain
+
+
+# A column that figures are given beside those of a record: what `law_ran` found.
+_RAN = "law ran"
+
+
+def with_ran(columns: Columns) -> Columns:
+    """Return a short table with what `law_ran` gives kept beside it, which several figures ask for."""
+    if not isinstance(columns, dict) or row_count(columns) > PIECE_ROWS:
+        return columns
+    ran = law_ran(columns)
+    ran.flags.writeable = False
+    return {**columns, _RAN: ran}
+
+
+def of_ran(columns: Columns) -> tuple[str, ...]:
+    """Return the names of the columns that `law_ran` reads."""
+    return (*RESTING, _RAN) if _RAN in columns else RESTING
 
 
 def law_ran(columns: Columns) -> NDArray[np.bool_]:
     """Return at which ticks the law ran: all but those in which the control stop commands rest."""
+    if _RAN in columns:
+        known: Any = columns[_RAN]
+        return np.asarray(known, np.bool_)
     resting: NDArray[np.bool_] = columns[RESTING[0]] == 0.0
     for name in RESTING[1:]:
         resting &= columns[name] == 0.0
@@ -88,7 +131,7 @@ def _disturbances(columns: Columns, who: str, d0_m: float) -> Iterator[Array]:
     half = max(round(HALF_SPAN_S / tick_s), 1)
     if row_count(columns) <= 4 * half:
         return
-    names = ["t_s", f"{who}_eta1_m_s", f"{who}_theta_dot_rad_s", *RESTING]
+    names = ["t_s", f"{who}_eta1_m_s", f"{who}_theta_dot_rad_s", *of_ran(columns)]
     for piece in pieces(columns, names, before=4 * half):
         eta1, w = piece[names[1]], piece[names[2]]
         if eta1.size > 4 * half:
@@ -116,7 +159,7 @@ def figures(columns: Columns, who: str, facts: LawFacts) -> dict[str, float]:
         return _disturbances(columns, who, facts.d0_m) if ticks.any_s else iter(())
 
     middle, bound, most = percentiles(sizes, [50, 90, 100])
-    ratio = facts.alpha_m_s3 / bound if bound > 0.0 else math.nan
+    ratio = _least_gain(columns, facts) / bound if bound > 0.0 else math.nan
     layered = ticks.layered
     inside = ticks.inside / ticks.ran if layered else math.nan
     acts = ratio >= GAIN_RATIO and inside >= IN_LAYER_SHARE and layered and ticks.thin
@@ -136,9 +179,20 @@ def figures(columns: Columns, who: str, facts: LawFacts) -> dict[str, float]:
     }
 
 
+def _least_gain(columns: Columns, facts: LawFacts) -> float:
+    """Return the least gain of the sliding term while the law ran; NaN for a law without one."""
+    if not facts.gain_names:
+        return float(facts.gain_m_s3({}))
+    gains = (
+        np.asarray(facts.gain_m_s3(piece))[law_ran(piece)]
+        for piece in pieces(columns, [*facts.gain_names, *of_ran(columns)])
+    )
+    return min((float(gain.min()) for gain in gains if gain.size), default=math.nan)
+
+
 def _layers(columns: Columns) -> Iterator[tuple[Array, Array, Array]]:
     """Yield time, ||s|| and eps of the ticks in which the law ran, piece by piece."""
-    for piece in pieces(columns, ["t_s", "s_x_m_s2", "s_y_m_s2", "eps_m_s2", *RESTING]):
+    for piece in pieces(columns, ["t_s", "s_x_m_s2", "s_y_m_s2", "eps_m_s2", *of_ran(columns)]):
         ran = law_ran(piece)
         s = np.hypot(piece["s_x_m_s2"], piece["s_y_m_s2"])
         yield piece["t_s"][ran], s[ran], piece["eps_m_s2"][ran]
@@ -175,10 +229,10 @@ def _share(columns: Columns, facts: LawFacts) -> float:
     """Return the median share of the sliding term in the jerk commanded.
 
     ||term|| / (||term|| + ||rest||), the rest being what the command has beside it. The term is
-    alpha s/(||s|| + eps), or what the law's own columns say.
+    (alpha + 2 F+) s/(||s|| + eps), or what the law's own columns say.
     """
     own = ["slide_x_m_s3", "slide_y_m_s3"] if "slide_x_m_s3" in columns else []
-    names = [*_OF_SHARE, *own, *RESTING]
+    names = [*_OF_SHARE, *facts.gain_names, *own, *of_ran(columns)]
 
     short = row_count(columns) <= PIECE_ROWS  # a long run's are worked out anew each time
     kept = [_shares(piece, facts) for piece in pieces(columns, names)] if short else None
@@ -222,7 +276,7 @@ def _terms(columns: Columns, facts: LawFacts) -> tuple[Array, Array]:
     if "slide_x_m_s3" in columns:
         return columns["slide_x_m_s3"], columns["slide_y_m_s3"]
     s_x, s_y = columns["s_x_m_s2"], columns["s_y_m_s2"]
-    pull = -facts.alpha_m_s3 / (np.hypot(s_x, s_y) + columns["eps_m_s2"])
+    pull = -facts.gain_m_s3(columns) / (np.hypot(s_x, s_y) + columns["eps_m_s2"])
     return pull * s_x, pull * s_y
 
 

@@ -8,7 +8,7 @@ all the same: its `outcome` is "fault".
 
 from __future__ import annotations
 
-import json
+import operator
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -21,6 +21,7 @@ from hil.config.deck import Deck, load_deck
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
 from hil.core.registries import OUTER_LAWS
+from hil.core.toml_text import toml_value
 from hil.record.reader import RunRecord, read_run
 
 if TYPE_CHECKING:
@@ -29,7 +30,9 @@ if TYPE_CHECKING:
     from hil.study.gym_env import HilEnv
 
 # An outer law: a name, FILE.py or FILE.py:NAME, or the class that `hil.outer_law` decorated.
-Law = str | Callable[..., Any]
+Law = str | os.PathLike[str] | Callable[..., Any]
+# As `--camera` names it, the index of a camera, or a video.
+Camera = str | int | os.PathLike[str]
 
 __all__ = [
     "Comparison",
@@ -63,7 +66,7 @@ def run(
     *,
     inner: str = "asg-ism",
     on: str = "twin",
-    camera: str | None = None,
+    camera: Camera | None = None,
     out: AnyPath | None = None,
     in_memory: bool = False,
     record_camera: bool = False,
@@ -89,13 +92,13 @@ def run(
 
 def experiment(
     deck: str | Deck | Sequence[str] = "thesis",
-    laws: Iterable[str] | None = None,
+    laws: Iterable[Law] | Law | None = None,
     seed: int = 1,
     *,
     repeats: int = 1,
     inner: str = "asg-ism",
     on: str = "twin",
-    camera: str | None = None,
+    camera: Camera | None = None,
     out: AnyPath | None = None,
     workers: int | None = None,
     circle: bool = True,
@@ -116,10 +119,15 @@ def experiment(
 
     if repeats < 1 or (workers is not None and workers < 1):
         raise BadInput(f"experiment: repeats = {repeats}, workers = {workers}: at least 1 each")
-    _check_seed(seed)
     chosen = _deck(deck, laws)
     conditions = many.Conditions(
-        on, camera, inner, seed, repeats, tuple(_overrides(overrides)), "hil.experiment"
+        on,
+        _camera(camera),
+        inner,
+        _seed(seed),
+        repeats,
+        tuple(_overrides(overrides)),
+        "hil.experiment",
     )
     folder = Path(out) if out is not None else new_folder("experiment")
     specs = many.deck_specs(chosen, conditions, folder)
@@ -152,7 +160,7 @@ def compare(*runs: Run | RunRecord | AnyPath) -> Comparison:
 
 
 def replay(
-    run: Run | AnyPath, outer: str | None = None, *, recorded_code: bool = False, **overrides: Any
+    run: Run | AnyPath, outer: Law | None = None, *, recorded_code: bool = False, **overrides: Any
 ) -> ReplayReport:
     """Send a record through the host's loop again, as `hil replay` does.
 
@@ -165,7 +173,10 @@ def replay(
     folder = run.path if isinstance(run, Run) else Path(run)
     if folder is None:
         raise BadInput("replay: this run was kept in memory; make it with a record")
-    return exact.replay(folder, outer, _overrides(overrides), recorded_code=recorded_code)
+    law = None if outer is None else os.fspath(outer) if isinstance(outer, os.PathLike) else outer
+    if law is not None and not isinstance(law, str):
+        law = _law_name(law)
+    return exact.replay(folder, law, _overrides(overrides), recorded_code=recorded_code)
 
 
 def open_record(path: AnyPath) -> Run:
@@ -182,7 +193,7 @@ def make_env(
     *,
     inner: str = "asg-ism",
     on: str = "twin",
-    camera: str | None = None,
+    camera: Camera | None = None,
     cost: str = "usual",
     **overrides: Any,
 ) -> HilEnv:
@@ -207,33 +218,57 @@ def make_env(
 
 
 def _spec(
-    scenario: Scenario, outer: Law | None, inner: str, on: str, camera: str | None, seed: int
+    scenario: Scenario,
+    outer: Law | None,
+    inner: str,
+    on: str,
+    camera: Camera | None,
+    seed: int,
 ) -> RunSpec:
     from hil.board.wheel_laws import require_wheel_law  # noqa: PLC0415
     from hil.runs.execute import RunSpec, camera_for  # noqa: PLC0415 - loads the rigs
 
     require_wheel_law(inner)
-    _check_seed(seed)
     return RunSpec(
         scenario=scenario,
         target=on,
-        camera=camera_for(scenario, on, camera),
+        camera=camera_for(scenario, on, _camera(camera)),
         outer=_law_name(scenario.control.outer if outer is None else outer),
         inner=inner,
-        seed=seed,
+        seed=_seed(seed),
         out=Path(),
         command="hil.run",
     )
 
 
-def _check_seed(seed: int) -> None:
-    if not 0 <= seed < 2**31:
-        raise BadInput(f"seed = {seed}: must be from 0 to {2**31 - 1}")
+def _seed(seed: Any) -> int:
+    """Return a seed, also one of NumPy's, as an int; raises BadInput."""
+    try:
+        number = int(seed) if float(seed).is_integer() and not isinstance(seed, str | bool) else -1
+    except (TypeError, ValueError, OverflowError):
+        number = -1
+    if not 0 <= number < 2**31:
+        raise BadInput(f"seed = {seed!r}: must be a whole number from 0 to {2**31 - 1}")
+    return number
+
+
+def _camera(camera: Camera | None) -> str | None:
+    """Return a camera as `--camera` names it: 0 is the first camera, a path a video."""
+    if camera is None or isinstance(camera, str):
+        return camera
+    if isinstance(camera, os.PathLike):
+        return os.fspath(camera)
+    try:
+        return str(operator.index(camera))
+    except TypeError:
+        raise BadInput(
+            f"camera = {camera!r}: rendered, pose, a camera's index, a video file or twin:SOCKET is needed"
+        ) from None
 
 
 def _law_name(outer: Law) -> str:
-    if isinstance(outer, str):
-        return OUTER_LAWS.get(outer).name
+    if isinstance(outer, str | os.PathLike):
+        return OUTER_LAWS.get(os.fspath(outer)).name
     for entry in OUTER_LAWS.entries():
         if entry.factory is outer:
             return entry.name
@@ -241,7 +276,7 @@ def _law_name(outer: Law) -> str:
     raise BadInput(f"outer = {name}: not a registered law; decorate it: @hil.outer_law({name!r})")
 
 
-def _deck(deck: str | Deck | Sequence[str], laws: Iterable[str] | None) -> Deck:
+def _deck(deck: str | Deck | Sequence[str], laws: Iterable[Law] | Law | None) -> Deck:
     if isinstance(deck, str):
         chosen = load_deck(deck)
     elif isinstance(deck, Deck):
@@ -250,7 +285,8 @@ def _deck(deck: str | Deck | Sequence[str], laws: Iterable[str] | None) -> Deck:
         chosen = load.build(Deck, {"scenarios": list(deck)}, "deck")
     if laws is None:
         return chosen
-    tree = chosen.model_dump(mode="json") | {"laws": [_law_name(law) for law in laws]}
+    named = laws if isinstance(laws, Iterable) and not isinstance(laws, str) else [laws]
+    tree = chosen.model_dump(mode="json") | {"laws": [_law_name(law) for law in named]}
     return load.build(Deck, tree, "deck")
 
 
@@ -260,15 +296,12 @@ def _overrides(values: Mapping[str, Any]) -> list[str]:
 
 
 def _toml(key: str, value: Any) -> str:
-    if hasattr(value, "tolist"):  # NumPy's
-        value = value.tolist()
-    if isinstance(value, tuple):
-        value = list(value)
-    if not isinstance(value, str | bool | int | float | list):
+    try:
+        return toml_value(value)
+    except TypeError:
         raise BadInput(
-            f"{key} = {value!r}: a number, text, true or false, or a list of them is needed"
-        )
-    return json.dumps(value)  # of these, the text is the same in TOML
+            f"{key} = {value!r}: a number, text, true or false, or a list or table of them is needed"
+        ) from None
 
 
 def _unless_interrupted(record: RunRecord) -> Run:

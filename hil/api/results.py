@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hil.analysis.own_figures import ReadOnly
 from hil.core.errors import BadInput
 from hil.record.journal import arrow_table
 from hil.record.reader import RunRecord
@@ -61,13 +62,16 @@ class Run:
 
     @property
     def samples(self) -> Mapping[str, NDArray[np.float64]]:
-        """Return the columns of the outer ticks by name, NaN where a value does not exist."""
-        return self.record.samples
+        """Return the columns of the outer ticks by name, NaN where a value does not exist.
+
+        A record stays as it was: work on a copy (`run.samples["est_x_m"] * 1e3` is one).
+        """
+        return _read_only(self.record.samples)
 
     @property
     def frames(self) -> Mapping[str, NDArray[np.float64]]:
-        """Return the columns of the camera frames by name, NaN where a value does not exist."""
-        return self.record.frames
+        """Return the columns of the camera frames by name, as `samples` does the ticks."""
+        return _read_only(self.record.frames)
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -201,6 +205,12 @@ def _frame(page: str) -> str:
         f'<iframe srcdoc="{html.escape(page)}" title="report" loading="lazy" '
         'style="width:100%;height:40em;border:1px solid #ccc"></iframe>'
     )
+
+
+def _read_only(columns: Mapping[str, NDArray[np.float64]]) -> Mapping[str, NDArray[np.float64]]:
+    """Return columns that cannot be written to; those of a long run are read when asked for."""
+    kept = ReadOnly(columns)
+    return dict(kept) if isinstance(columns, dict) else kept
 
 
 def _table(columns: Mapping[str, NDArray[np.float64]], schema: Sequence[Any]) -> pa.Table:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hil.cli.options import json_option, print_json
+from hil.cli.options import OutFile, json_option, print_json
 
 if TYPE_CHECKING:
     from hil.analysis.speed import Figure
@@ -32,7 +32,7 @@ _SPEED = ("speed", "parts", "batch", "law", "campaign", "report")
 @click.option("--against", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
               help="speed to report: compare with what --json printed at another revision: ratio of "
               "the medians with its 95 % interval.")  # fmt: skip
-@click.option("--page", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+@click.option("--page", type=OutFile(), metavar="FILE",
               help="vision: write an HTML page with the worst frames there.")  # fmt: skip
 @click.option("--frames", type=click.IntRange(2, 10_000), default=40, show_default=True,
               help="vision: frames of each condition that marks, tags and peers are shown.")  # fmt: skip
@@ -48,7 +48,7 @@ _SPEED = ("speed", "parts", "batch", "law", "campaign", "report")
               help="growth: runs up to so many seconds.")  # fmt: skip
 @click.option("--most-rows", type=click.IntRange(10, 1_000_000), default=100_000, show_default=True,
               help="growth: campaigns up to so many rows.")  # fmt: skip
-@click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+@click.option("--plot", type=OutFile(), metavar="FILE",
               help="growth: draw it there, as SVG.")  # fmt: skip
 @json_option
 def command(

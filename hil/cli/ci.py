@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from hil.cli.options import OutFile
 from hil.core.errors import BadInput, RigFault
 from hil.core.text import visible
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from hil.record.reader import RunRecord
 
 junit_option = click.option(
-    "--junit", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.xml",
+    "--junit", type=OutFile(), metavar="FILE.xml",
     help="Write the verdict on each requirement as a JUnit test case, for a CI.",
 )  # fmt: skip
 

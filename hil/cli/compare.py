@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 import click
 
 from hil.cli.ci import junit_file, junit_option, tell_ci
-from hil.cli.options import figure_option, figures_option, json_option, print_json
+from hil.cli.options import (
+    OutFile,
+    different_files,
+    figure_option,
+    figures_option,
+    json_option,
+    print_json,
+)
 from hil.core.text import visible
 
 if TYPE_CHECKING:
@@ -17,11 +24,11 @@ if TYPE_CHECKING:
 
 @click.command("compare")
 @click.argument("runs", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RUN...")
-@click.option("--report", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.html",
+@click.option("--report", type=OutFile(), metavar="FILE.html",
               help="Write an HTML report that opens without a network.")  # fmt: skip
-@click.option("--csv", "csv_file", type=click.Path(path_type=Path, dir_okay=False),
+@click.option("--csv", "csv_file", type=OutFile(),
               metavar="FILE.csv", help="Write every run's figures as CSV.")  # fmt: skip
-@click.option("--rerun", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.rrd",
+@click.option("--rerun", type=OutFile(), metavar="FILE.rrd",
               help="Write all runs as one recording for the viewer, on a common timeline.")  # fmt: skip
 @figure_option
 @figures_option
@@ -51,6 +58,7 @@ def command(
     from hil.runs.execute import judged_status
     from hil.study.experiment import study
 
+    different_files(report=report, csv=csv_file, rerun=rerun, junit=junit)
     with junit_file(junit, "compare"):
         more = [metric_of(name) for name in own_figures]
         records = [read_run(run).with_own_figures(more) for run in runs]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from hil.cli.options import OutFile
 from hil.core.text import visible
 
 
@@ -13,7 +14,7 @@ from hil.core.text import visible
 @click.argument("run", type=click.Path(path_type=Path))
 @click.option("--to", "form", type=click.Choice(["csv", "mcap", "ulog"]), required=True,
               help="csv: the table; mcap: all of it (Foxglove); ulog: signals (PX4's tools).")  # fmt: skip
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True,
+@click.option("--out", type=OutFile(), required=True,
               metavar="FILE", help="File to write; one that is there is replaced.")  # fmt: skip
 def command(run: Path, form: str, out: Path) -> int:
     """Write RUN, the folder of a run record, as a file of another format.

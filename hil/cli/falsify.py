@@ -72,7 +72,7 @@ def command(
     from hil.core.registries import OUTER_LAWS
     from hil.study.campaign.workers import Pool
     from hil.study.falsify.box import load_box
-    from hil.study.falsify.keep import add_to_deck, claim_folder, write_scenario
+    from hil.study.falsify.keep import Asked, add_to_deck, claim_folder, write_scenario
     from hil.study.falsify.margin import OneRun
     from hil.study.falsify.search import falsify
 
@@ -89,8 +89,9 @@ def command(
     file = deck = None
     if found.reduced is not None:
         claim_folder(keep)
-        file = write_scenario(keep, scenario, overrides, box, found.reduced, law, seed, other)
-        deck = add_to_deck(keep, file, law, seed)
+        asked = Asked(law, seed, inner, other)
+        file = write_scenario(keep, scenario, box, found.reduced, asked)
+        deck = add_to_deck(keep, file, asked)
     if as_json:
         print_json(_document(box, found, law, other, seed, file, deck))
     else:

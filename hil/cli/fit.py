@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from hil.cli.options import json_option, print_json
+from hil.cli.options import OutFile, json_option, print_json
 
 
 @click.command("fit")
@@ -19,7 +19,7 @@ from hil.cli.options import json_option, print_json
 @click.option("--start", metavar="ROBOT",
               help="The robot as believed: a built-in name or a TOML file. [default: what stands in "
               "--robot, else thesis-4wd]")  # fmt: skip
-@click.option("--report", type=click.Path(path_type=Path), metavar="FILE.html",
+@click.option("--report", type=OutFile(), metavar="FILE.html",
               help="Where the page goes. [default: beside the robot file]")  # fmt: skip
 @click.option("--replay", "replay", is_flag=True,
               help="Fit nothing and write nothing: send LOG's commands through the twin that --robot "

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hil.cli.options import json_option, out_option, print_json
+from hil.cli.options import OutFile, json_option, out_option, print_json
 from hil.cli.progress import Stage, stage_progress
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ Update = Callable[[int, int], None]
               help="Change a parameter of the study, for example disturbance=0.25.")  # fmt: skip
 @click.option("--quick", is_flag=True,
               help="Rows and claims alone, without the sweeps over assumed values and starts.")  # fmt: skip
-@click.option("--markdown", "markdown_file", type=click.Path(path_type=Path), metavar="FILE",
+@click.option("--markdown", "markdown_file", type=OutFile(), metavar="FILE",
               help="Also write claims and rows as Markdown.")  # fmt: skip
 @out_option
 @json_option

@@ -1,4 +1,7 @@
-"""stdout and stderr whose reader may go away (`| head`, a lost terminal): what follows is dropped.
+"""stdout and stderr that take everything, whatever their reader and their letters are.
+
+A reader may go away (`| head`, a lost terminal): what follows is dropped. A letter that the encoding of
+the locale does not have (a Greek one on a Windows pipe) is written as its number.
 
 A command is not over because nobody reads on: what it still has to write elsewhere is written, and
 its exit status is its own.
@@ -6,6 +9,7 @@ its exit status is its own.
 
 from __future__ import annotations
 
+import codecs
 import errno
 import io
 import os
@@ -36,6 +40,9 @@ class _Outlet(io.FileIO):
 def let_readers_go() -> None:
     """Put such streams in place of stdout and stderr."""
     if os.name != "posix":
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, io.TextIOWrapper):
+                stream.reconfigure(errors=_errors_of(stream))
         return
     sys.stdout, sys.stderr = _outlet(sys.stdout, 1), _outlet(sys.stderr, 2)
 
@@ -47,10 +54,19 @@ def _outlet(stream: TextIO | None, descriptor: int) -> TextIO:
     return io.TextIOWrapper(
         io.BufferedWriter(_Outlet(descriptor, "w", closefd=False)),
         encoding=stream.encoding,
-        errors=stream.errors,
+        errors=_errors_of(stream),
         line_buffering=stream.line_buffering,
         write_through=stream.write_through,
     )
+
+
+def takes_every_letter(stream: TextIO) -> bool:
+    """Say whether the encoding of a stream has every letter."""
+    return codecs.lookup(stream.encoding or "utf-8").name.startswith("utf")
+
+
+def _errors_of(stream: TextIO) -> str:
+    return (stream.errors or "strict") if takes_every_letter(stream) else "backslashreplace"
 
 
 def _writes_to(stream: TextIO, descriptor: int) -> bool:

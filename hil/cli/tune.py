@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hil.cli.options import (
+    OutFile,
     figure_option,
     json_option,
     outers_option,
@@ -51,7 +52,7 @@ if TYPE_CHECKING:
               show_default=True, help="What the twin sees with.")  # fmt: skip
 @click.option("--workers", type=click.IntRange(1, 1024),
               help="Processes on this machine; the result is the same. [default: one a core]")  # fmt: skip
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), default=Path("tuned.toml"),
+@click.option("--out", type=OutFile(), default=Path("tuned.toml"),
               show_default=True, metavar="FILE", help="Where the gain set goes.")  # fmt: skip
 @json_option
 def command(

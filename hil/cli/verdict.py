@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hil.cli.options import json_option, outers_option, plain_console, print_json
+from hil.cli.options import OutFile, json_option, outers_option, plain_console, print_json
 from hil.core.text import visible
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 @click.option("--ablation/--no-ablation", "ablated", default=True, help="Switch parts off in turn.")
 @click.option("--workers", type=click.IntRange(1, 1024),
               help="Processes on this machine; the result is the same. [default: one a core]")  # fmt: skip
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+@click.option("--out", type=OutFile(), metavar="FILE",
               help="Where the data go. [default: verdict.json in a new folder of runs/]")  # fmt: skip
 @click.option("--kept", metavar="FILE",
               help="No run: what the data of an earlier verdict say; shipped: those of README.")  # fmt: skip
@@ -62,7 +62,7 @@ def command(
     Searches see one half of the deck's tasks and conditions, the verdict is spoken on the other half
     (docs/verdict.md). Every law gets the same budget. Laws are compared at equal calm: how accurate
     each is at the same variation of commands and PWM. With several seeds of the search, a difference
-    that one of them does not show is no difference shown.
+    that one of them does not show is no difference shown. With --outer PID is judged beside the laws named.
 
     The data are written after each seed of the search, so that an early end leaves those.
 

@@ -47,6 +47,9 @@ class Section(BaseModel):
                     known = sorted(cls.model_fields)
                     near = difflib.get_close_matches(str(key), known, n=3, cutoff=0.5)
                     raise ValueError(f"unknown key {key!r}; near: {', '.join(near or known)}")
+                if isinstance(tree[key], bool) and "unit" in extra_of(cls.model_fields[key]):
+                    said = str(tree[key]).lower()
+                    raise ValueError(f"{key} = {said}: a number is needed, not true or false")
         return tree
 
     @classmethod

@@ -139,6 +139,7 @@ def read_tree(name_or_path: str, kind: str, above: tuple[str, ...] = ()) -> Tree
     fill_gains(tree, folder)
     base = tree.pop("base", None)
     if base is not None:
+        _refuse_other_kind(where, str(base), kind)
         below = read_tree(_beside(folder, str(base)), _base_kind(str(base), kind), above)
         tree = merge(below, tree)
     return tree
@@ -176,6 +177,20 @@ def _set_files_beside(tree: Tree, folder: Path | None) -> None:
         tree["plant"] = str(folder.resolve() / tree["plant"])
 
 
+def _refuse_other_kind(where: str, base: str, kind: str) -> None:
+    """Raise BadInput for a scenario's file where another kind is wanted; what it lies on tells."""
+    if kind in {"scenarios", "labs"} or base in builtin_names(kind):
+        return
+    if base in {*builtin_names("scenarios"), *builtin_names("labs")}:
+        hint = f"; name it in a deck: scenarios = [{where!r}]" if kind == "decks" else ""
+        raise BadInput(f"{where}: is a scenario (base = {base!r}), a {_one(kind)} is needed{hint}")
+
+
+def _one(kind: str) -> str:
+    """Return the name of one of a kind of files."""
+    return "box" if kind == "boxes" else kind.removesuffix("s")
+
+
 def _base_kind(base: str, kind: str) -> str:
     """Return the kind of the file below: a scenario or lab lies on either."""
     if kind not in {"scenarios", "labs"}:
@@ -203,7 +218,7 @@ def _read_text(name_or_path: str, kind: str) -> tuple[str, str, Path | None]:
         item = files("hil") / "data" / kind / f"{name_or_path}.toml"
         return item.read_text(encoding="utf-8"), item.name, None
     path = Path(name_or_path)
-    one = kind.removesuffix("s")
+    one = _one(kind)
     if not is_file(path):
         names = builtin_names(kind)
         near = difflib.get_close_matches(name_or_path, names, n=2)

@@ -25,7 +25,7 @@ async def body_of(request: Request) -> dict[str, Any]:
     """Return the JSON object that a page sent; raises BadInput."""
     try:
         tree = await request.json()
-    except ValueError:
+    except (ValueError, RecursionError):
         raise BadInput("not understood: no JSON") from None
     if not isinstance(tree, dict):
         raise BadInput("not understood: no table")
@@ -33,8 +33,8 @@ async def body_of(request: Request) -> dict[str, Any]:
 
 
 def names_of(tree: dict[str, Any]) -> list[str]:
-    """Return the names of records in what a page sent; raises BadInput."""
+    """Return the names of records in what a page sent, each once; raises BadInput."""
     names = tree.get("names")
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise BadInput("not understood: names of records are wanted")
-    return names
+    return list(dict.fromkeys(names))

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from hil.core.errors import BadInput
+from hil.core.files import is_left
 from hil.core.text import visible
 from hil.record import layout
 
@@ -110,6 +111,13 @@ def _records(folder: Path, depth: int) -> Iterator[Path]:
             yield path
         elif depth > 1:
             yield from _records(path, depth - 1)
+
+
+def require_closed(record: Path, name: str) -> None:
+    """Raise BadInput for a record that some process is writing, this console's or another."""
+    reserve = record / layout.RESERVE
+    if reserve.exists() and not is_left(reserve):
+        raise BadInput(f"record {visible(name)}: its run is on: stop it first, or wait for its end")
 
 
 def in_bin(root: Path, record: Path) -> Path:

@@ -171,7 +171,9 @@ def read_item(path: Path, name: str) -> Item:
             failed=failed,
             command=str(tree.get("command", "")),
         )
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (
+        OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError
+    ) as error:  # fmt: skip
         return Item(name, "", "", "", "", 0, "", "damaged", f"{type(error).__name__}: {error}")
 
 

@@ -13,7 +13,7 @@ from starlette.responses import FileResponse, Response
 
 from hil.console.access import REPORT_POLICY
 from hil.console.answers import answer_json, body_of, names_of, number
-from hil.console.folders import in_bin, out_of_bin
+from hil.console.folders import in_bin, out_of_bin, require_closed
 from hil.console.listing import Wanted
 from hil.console.reports import report_file
 from hil.console.tasks import required
@@ -79,6 +79,8 @@ async def _delete(request: Request, console: Console) -> Response:
     on = console.live.state()["begin"].get("record")
     if console.live.busy and on in {console.folders.name_of(record) for record in records}:
         raise BadInput("this run is on: stop it first")
+    for record in records:
+        require_closed(record, console.folders.name_of(record))
     binned = [in_bin(console.folders.root, record).name for record in records]
     return answer_json({"binned": binned})
 

@@ -203,7 +203,9 @@ async def _take(console: Console, page: Page, text: str) -> None:
             _ORDERS[do](console, message)
     except BadInput as error:
         page.put("said", {"error": str(error)})
-    except (ValueError, KeyError, TypeError) as error:
+    except OSError as error:
+        page.put("said", {"error": f"{error.filename or ''}: {error.strerror or error}"})
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
         page.put("said", {"error": f"not understood: {type(error).__name__}"})
 
 

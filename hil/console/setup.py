@@ -99,15 +99,15 @@ async def _doctor(_request: Request, console: Console) -> Response:
 async def _calibrate(request: Request, console: Console) -> Response:
     """Run `hil calibrate camera|floor|colours` on the pictures given."""
     tree = await body_of(request)
-    step = tree.get("step")
+    step = str(tree.get("step", ""))
     makers = {"lens": _lens, "floor": _floor, "colours": _colours}
     if step not in makers:
-        raise BadInput(f"calibrate: {step!r}: choose {', '.join(makers)}")
+        raise BadInput(f"calibrate: {visible(step)!r}: choose {', '.join(makers)}")
     folders = console.folders
     camera = folders.set_up / CAMERA_FILE
     drawn = folders.set_up / DRAWN
     drawn.mkdir(exist_ok=True)
-    words = [*makers[str(step)](tree, folders), "--camera-file", str(camera), "--json"]
+    words = [*makers[step](tree, folders), "--camera-file", str(camera), "--json"]
     picture = drawn / f"{step}.png"
     if step != "colours":
         words += ["--picture", str(picture)]
@@ -171,7 +171,7 @@ def _colours(tree: dict[str, Any], folders: Folders) -> list[str]:
 def _number(row: object, place: int) -> float:
     """Return a number of a list that a page sent; raises BadInput."""
     value = row[place] if isinstance(row, list) and len(row) > place else None
-    if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > 1e6:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 1e6:
         raise BadInput("not understood: numbers are wanted; click on the picture, fill every field")
     return float(value)
 

@@ -34,7 +34,13 @@ class AsgIsm(Law):
     term is the projection of s on the ball of radius k dt_s, which needs no layer. `dominating` is
     the gain law (4.14) as printed: no -kappa in w, k + 2 (||kappa|| + |d eps/dt|) outweighs it.
     `radial` takes H = sigma ||p||, which no turn of the axes changes.
+
+    `without_kappa` leaves kappa out of the terms; `without_gamma` starts with eta of p(0) = q(0) = 0, so that
+    s(0) is not 0. Both are off, and are there to see what a part is worth.
     """
+
+    without_kappa: bool
+    without_gamma: bool
 
     def __init__(
         self,

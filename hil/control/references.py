@@ -270,11 +270,11 @@ def unfinished(config: ReferenceConfig, duration_s: float) -> str | None:
     reference = Waypoints(config)
     if reference.duration_s <= duration_s:
         return None
-    way = reference.share_of_way(duration_s)
+    done = min(100.0 * reference.share_of_way(duration_s), 99.9)
     return (
         f"reference.points_m: the way takes {reference.duration_s:.4g} s within speed_max_m_s = "
         f"{config.speed_max_m_s:g} m/s and turn_rate_max_rad_s = {config.turn_rate_max_rad_s:g} rad/s, "
-        f"the run ends after {duration_s:g} s with {100 * way:.2g} % of it done, and its figures "
+        f"the run ends after {duration_s:g} s with {done:.3g} % of it done, and its figures "
         "judge no more than that; give duration_s more, or the path a wider turn"
     )
 

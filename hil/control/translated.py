@@ -4,8 +4,9 @@ Their one source is Python: hil/control/native/outer/translate.py writes it as C
 are built, operation by operation. What is asked for here is given only where the native code is that of the
 objects it stands for: the sources are as they were translated, none of their functions and numbers has been
 replaced, and the objects are of these classes themselves with nothing of their own. Every other law runs in
-Python: one from elsewhere, a class derived from a built-in one, a block put around its parts. Native code
-asks it each tick. Where a source was just edited, or a function replaced, all of a run's ticks are Python's.
+Python: one from elsewhere, a class derived from a built-in one, one whose gains change on the way. Native
+code asks it each tick. Where a source was just edited, or a function replaced, all of a run's ticks are
+Python's.
 """
 
 from __future__ import annotations
@@ -22,13 +23,12 @@ from typing import Any
 
 from hil.control import AsgIsm as AsgBlock
 from hil.control import _outer
-from hil.control.laws.asg_ism import AsgIsm
+from hil.control.laws import axes
 from hil.control.laws.axes import TurnedAxes
-from hil.control.laws.chain import Chain
 from hil.control.laws.guard import GuardedLaw
 from hil.control.laws.hold import HoldAtGoal
 from hil.control.laws.let_go import LetGo
-from hil.control.laws.state_feedback import StateFeedback
+from hil.control.laws.parts import WithoutFeedForward
 from hil.control.laws.turn_first import TurnFirst
 from hil.control.laws.within import WithinWheelSpeed
 from hil.control.references import Circle, Point, Stops, Waypoints
@@ -75,6 +75,9 @@ _FUNCTIONS = [
     if isinstance(function := getattr(value, "__wrapped__", value), FunctionType)
 ]
 _CODES = [function.__code__ for function in _FUNCTIONS]
+_CLASSES = {owner for owner in _owners() if isinstance(owner, type)}
+_LAWS = {kind for kind in _CLASSES if kind.__name__ in _outer.LAWS}
+_PLAIN = (float, int, bool, str, type(None), AsgBlock)
 
 
 @cache
@@ -144,29 +147,62 @@ def native_law(law: object, own_terms: tuple[str, ...] = ()) -> _outer.OuterLaw 
 def _law(law: Any, own_terms: tuple[str, ...], stand_in: StandIn | None = None) -> _outer.OuterLaw:
     kind = type(law)
     around = _AROUND.get(kind)
-    if around is not None and _is_plain(law) and (kind is not TurnedAxes or _is_known(law)):
+    if around is not None and _is_plain(law):
         return around(_law(law._law, own_terms, stand_in), law)
+    if kind is TurnedAxes and _is_plain(law) and (more := _own_vectors(own_terms)) is not None:
+        return _outer.turned_axes(_law(law._law, own_terms, stand_in), law._angle_rad, more)
     if is_translated(law):
-        return _outer.law(kind.__name__, law._gains, law._limits, law._d0)
+        return _outer.law(kind.__name__, law._gains, law._limits, law._d0, **_block_parts(law))
     if stand_in is not None and kind is GuardedLaw and law.makes_batches:
         return stand_in(law)
     return _outer.python_law(law, own_terms)
 
 
-def _is_known(law: Any) -> bool:
-    """Say whether axes are turned for a translated law: another's own terms are turned in Python."""
-    while type(law) in _AROUND:
-        law = law._law
-    return is_translated(law)
+def trace_places(own_terms: tuple[str, ...]) -> dict[str, int]:
+    """Return where in a trace native code has each name; one that translated laws have is theirs."""
+    known = [*_outer.TRACE_KEYS, *own_terms]
+    return {key: known.index(key) for key in known}
+
+
+@cache
+def _own_vectors(own_terms: tuple[str, ...]) -> list[tuple[int, int]] | None:
+    """Return places of X and Y of vectors that are a law's own.
+
+    None where X or Y of one may be a name that is not kept: such axes are turned in Python.
+    """
+    places = trace_places(own_terms)
+    pairs = axes._pairs(tuple(places))
+    paired = [name for pair in pairs for name in pair]
+    own = places.keys() - set(_outer.TRACE_KEYS)
+    alone = any(axes.is_of_a_vector(name) for name in own - set(paired))
+    if alone or len(set(paired)) < len(paired):
+        return None
+    return [(places[x], places[y]) for x, y in pairs if {x, y} & own]
 
 
 def is_translated(law: Any) -> bool:
     """Say whether a law is one of those that are written as native code, itself and whole."""
-    kind = type(law)
-    if not (kind is StateFeedback or kind is AsgIsm) or not _is_plain(law):
-        return False
-    blocks = kind is StateFeedback or type(law._block) is AsgBlock
-    return blocks and type(law._chain) is Chain and _is_plain(law._chain)
+    return type(law) in _LAWS and _is_native(law)
+
+
+def _is_native(value: Any) -> bool:
+    """Say whether an object and all that it has are of classes that native code has, and hide nothing."""
+    kind = type(value)
+    if kind in _PLAIN:
+        return True
+    if kind is tuple:
+        return all(map(_is_native, value))
+    return kind in _CLASSES and _is_plain(value) and all(map(_is_native, vars(value).values()))
+
+
+def _block_parts(law: Any) -> dict[str, bool]:
+    """Return the parts that a law's sliding block leaves out."""
+    block = getattr(law, "_block", None)
+    return {
+        name: True
+        for name in ("without_kappa", "without_gamma")
+        if block is not None and getattr(block, name)
+    }
 
 
 def _geometry(law: Any) -> Any:
@@ -174,12 +210,12 @@ def _geometry(law: Any) -> Any:
 
 
 _AROUND: dict[type, Callable[[_outer.OuterLaw, Any], _outer.OuterLaw]] = {
-    TurnedAxes: lambda inner, law: _outer.turned_axes(inner, law._angle_rad),
     HoldAtGoal: lambda inner, law: _outer.hold_at_goal(inner, law._enter, law._leave),
     WithinWheelSpeed: lambda inner, law: _outer.within_wheel_speed(
         inner, _geometry(law), law._omega_max_rad_s
     ),
     TurnFirst: lambda inner, law: _outer.turn_first(inner, law._missing_rad_s),
+    WithoutFeedForward: lambda inner, _: _outer.without_feed_forward(inner),
     LetGo: lambda inner, law: _outer.let_go(inner, _geometry(law), law._least_rad_s),
 }
 

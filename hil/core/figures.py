@@ -86,7 +86,7 @@ METRICS = (
            "the same, 90th percentile: the D that alpha must exceed twice"),
     Metric("disturbance_max_m_s3", "m/s³", "disturbance, largest", "the same, largest"),
     Metric("alpha_over_d90_ratio", "", "alpha / D90",
-           "gain of the sliding term / 90 % bound of the disturbance; the theorem asks for 2",
+           "least gain of the sliding term / 90 % bound of the disturbance; the theorem asks for 2",
            "higher"),
     Metric("s_over_eps_median_ratio", "", "||s||/eps, median",
            "median of ||s||/eps over the ticks of the law; near 0 the term is a weak spring",

@@ -42,6 +42,8 @@ def replacing(path: Path) -> Iterator[Path]:
 
     After an error the half-written file is gone and `path` is as it was. Raises OSError.
     """
+    if not path.name:
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     part = path.with_name(f"{path.name}{PART}")
     try:
         yield part
@@ -150,8 +152,11 @@ def read_bounded(path: Path, limit_bytes: int = TEXT_BYTES) -> bytes:
 
 
 def read_text(path: Path, limit_bytes: int = TEXT_BYTES, encoding: str = "utf-8") -> str:
-    """Return a text file with plain line ends; raises BadInput, OSError, UnicodeDecodeError."""
-    text = read_bounded(path, limit_bytes).decode(encoding)
+    """Return a text file with plain line ends and no byte-order mark.
+
+    Raises BadInput, OSError, UnicodeDecodeError.
+    """
+    text = read_bounded(path, limit_bytes).decode(encoding).removeprefix("\ufeff")
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 Given = TypeVar("Given")
@@ -45,6 +45,8 @@ def _hold(held: _Held) -> bool:
 # What was looked through last: several functions are asked of one scenario, and of its robot.
 _seen: list[tuple[Any, _Held]] = []
 _MOST_SEEN = 2
+# Of these nothing can be changed in place: most of what a section holds.
+_PLAIN = frozenset((float, int, str, bool, type(None)))
 
 
 def _held_by(given: Any) -> _Held:
@@ -56,15 +58,22 @@ def _held_by(given: Any) -> _Held:
     return held
 
 
-def _tables(value: Any) -> Iterator[Any]:
-    """Yield what can be changed in place: of a section, and in what that holds."""
-    if isinstance(value, dict | list):
-        yield value
-    if isinstance(value, dict):
-        value = tuple(value.values())
-    elif hasattr(type(value), "model_fields"):
-        value = tuple(vars(value).values())
-    if isinstance(value, tuple | list):
-        for item in value:
-            if not isinstance(item, float | str | int):
-                yield from _tables(item)
+def _tables(value: Any) -> list[Any]:
+    """Return what can be changed in place: of a section, and in what that holds."""
+    found, left = [], [value]
+    while left:
+        one = left.pop()
+        kind = type(one)
+        if kind in _PLAIN:
+            continue
+        if issubclass(kind, dict):
+            found.append(one)
+            left.extend(one.values())
+        elif issubclass(kind, list):
+            found.append(one)
+            left.extend(one)
+        elif issubclass(kind, tuple):
+            left.extend(one)
+        elif hasattr(kind, "model_config"):
+            left.extend(vars(one).values())
+    return found

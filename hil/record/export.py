@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hil.core.errors import BadInput
-from hil.core.files import replace_file
+from hil.core.files import replace_file, unwritable
 from hil.record.schema import SAMPLE_COLUMNS
 
 if TYPE_CHECKING:
@@ -22,12 +22,13 @@ FORMATS = ("csv", "mcap", "ulog")
 def export(run: RunRecord, form: str, path: Path) -> None:
     """Write a run to `path` in one of FORMATS, atomically.
 
-    Raises BadInput when the file cannot be written, or the package for the format is not there.
+    Raises BadInput when the file cannot be written, or the package for the format is not there, RigFault
+    when the disk is full.
     """
     try:
         replace_file(path, _bytes_of(run, form))
     except OSError as error:
-        raise BadInput(f"--out {path}: cannot be written: {error.strerror}") from None
+        raise unwritable(f"--out {path}", error) from None
 
 
 def _bytes_of(run: RunRecord, form: str) -> bytes:

@@ -30,6 +30,7 @@ from hil.record.log_signals import (
     scaled,
     whole_poses,
 )
+from hil.record.schema import SAMPLE_NAMES
 
 if TYPE_CHECKING:
     from hil.record.log_signals import Array
@@ -94,7 +95,12 @@ def timed_cells(path: Path, settings: LogMapping) -> tuple[_Cells, Array, Callab
 
 
 def read_csv(path: Path, settings: LogMapping) -> Signals:
-    """Return a row per pose of a CSV file; raises BadInput."""
+    """Return a row per pose of a CSV file; raises BadInput.
+
+    Without a mapping of columns those are taken that bear the names of `samples.parquet`.
+    """
+    if not settings.columns:
+        settings = settings.model_copy(update={"columns": _own_columns(path, settings)})
     wanted = wanted_columns(settings)
     cells, t_s, refusal = timed_cells(path, settings)
     order, notes = in_order(t_s, settings.disorder, refusal, "rows")
@@ -111,6 +117,16 @@ def read_csv(path: Path, settings: LogMapping) -> Signals:
         notes += more
     signals = whole_poses(times, columns, str(path))
     return Signals(signals.t_s, signals.columns, notes=(*cells.notes(), *notes, *signals.notes))
+
+
+def _own_columns(path: Path, settings: LogMapping) -> dict[str, Source]:
+    """Return the columns of a file that are called as in a record; raises BadInput."""
+    names = _read_table(path, [settings.t.column, *POSE]).names
+    return {
+        name: Source(column=name)
+        for name in SAMPLE_NAMES
+        if name in names and name not in {"t_s", settings.t.column}
+    }
 
 
 def _row_per_pose(

@@ -50,7 +50,9 @@ def signals_of(log: TopicLog, settings: LogMapping) -> Signals:
     sources = known | own
     if "est_x_m" not in sources:
         wanted = log.standard["est_x_m"].message if log.standard else ""
-        standard = f"neither the standard's {wanted} nor a mapping gives" if wanted else "gives"
+        standard = (
+            f"neither the standard's {wanted} nor a mapping gives" if wanted else "no mapping gives"
+        )
         raise BadInput(f"{log.path}: {standard} est_x_m; topics of the log: {_listed(log.topics)}")
     notes = list(log.notes)
     series: dict[str, tuple[Array, Array]] = {}

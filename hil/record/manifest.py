@@ -232,7 +232,7 @@ def read_manifest(folder: Path) -> Manifest:
         raise BadInput(f"{folder}: not a run record ({layout.MANIFEST} is missing)")
     try:
         tree = json.loads(read_bounded(path, RECORD_BYTES))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise BadInput(f"{path}: damaged, not readable as JSON: {error}") from None
     found = tree.get("schema_version") if isinstance(tree, Mapping) else None
     if not isinstance(found, int):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -126,12 +126,12 @@ class MemoryRecorder:
         self, outcome: Outcome, detail: str = "", link: metrics.LinkStats | None = None
     ) -> RunRecord:
         """Return the run; it has no folder, so its path is empty."""
-        stats = asdict(link or metrics.LinkStats())
+        stats = link or metrics.LinkStats()
         ended = {
             "outcome": outcome,
             "outcome_detail": detail,
             "tick_count": len(self.rows),
-            "link": {key: float(value) for key, value in stats.items()},
+            "link": {name: float(getattr(stats, name)) for name in stats.__dataclass_fields__},
         }
         return RunRecord(
             path=Path(),

@@ -15,6 +15,7 @@ from hil.analysis.metrics import all_metrics
 from hil.core.figures import BY_NAME, Metric, metric_of
 from hil.core.files import replace_file, unwritable
 from hil.core.text import visible
+from hil.record.layout import refuse_own_file
 from hil.report import figures as draw
 from hil.report.assumptions import Assumption, assumptions, gain_assumptions
 from hil.report.compare import HEADLINES, Comparison, Entry, best_entry, findings
@@ -47,8 +48,10 @@ def write_report(
     """Write the report of one or several comparisons to `path`, atomically.
 
     `command` is the command line that made it; `circle` adds the section on ideal sensing.
-    Raises BadInput when `path` cannot be written, RigFault when the disk is full.
+    Raises BadInput when `path` cannot be written or is a file of a record, RigFault when the disk is
+    full.
     """
+    refuse_own_file(path, "report")
     page = render(
         comparisons, command=command, title=title, circle=circle, repeats=repeats
     ).encode()

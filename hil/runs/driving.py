@@ -11,9 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from hil.control import _outer
 from hil.control.estimators.geometry import BelievedGeometry
-from hil.control.translated import native_forms
+from hil.control.translated import native_forms, trace_places
 from hil.record.memory import MemoryRecorder
 from hil.record.schema import TRACE_KEYS
 from hil.runs import _native
@@ -72,8 +71,7 @@ def make_drive(
     if forms is None:
         return None
     law, reference = forms
-    known = (*_outer.TRACE_KEYS, *parts.own_terms)
-    places = {key: place for place, key in enumerate(known)}
+    places = trace_places(parts.own_terms)
     return _native.Drive(
         pump=pump,
         watch=watch,

@@ -58,7 +58,8 @@ def make_manifest(spec: RunSpec, parameters: Mapping[str, float], used: Used) ->
     law = OUTER_LAWS.get(spec.outer)
     gains = spec.scenario.control.active_gains.of(law)
     now_us = time.time_ns() // 1000
-    return Manifest(
+    # Of values that were validated each by itself: campaigns open some hundred a second.
+    return Manifest.model_construct(
         command=spec.command,
         scenario=pickle.loads(_tree(spec.scenario)),
         seed=spec.seed,
@@ -77,7 +78,7 @@ def make_manifest(spec: RunSpec, parameters: Mapping[str, float], used: Used) ->
         signed=_is_signed(spec),
         open_loop_of=spec.target.removeprefix(REPLAY) if spec.target.startswith(REPLAY) else "",
         notes=list(_notes(spec.scenario)),
-        versions=collect_versions(),
+        versions=dict(collect_versions()),
         git_revision=git_revision(),
         start_time_utc=datetime.fromtimestamp(now_us * 1e-6, UTC).isoformat(timespec="seconds"),
         start_unix_us=now_us,

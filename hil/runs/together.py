@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hil.control import _outer
 from hil.control.laws.guarded_batch import GuardedBatch, batches
+from hil.control.translated import trace_places
 from hil.core.batch import ROWS
 from hil.core.errors import RigFault
 from hil.record.reader import RunRecord
@@ -211,8 +211,7 @@ class _Batch:
     def __init__(self, asked: Sequence[tuple[int, Asked]]) -> None:
         self._at = {place: at for at, (place, _) in enumerate(asked)}
         self._asked = [one for _, one in asked]
-        keys = (*_outer.TRACE_KEYS, *self._asked[0].own_terms)
-        self._places = {key: place for place, key in enumerate(keys)}
+        self._places = trace_places(self._asked[0].own_terms)
         self._batch: GuardedBatch | None = None
 
     def answer(self, places: Sequence[int]) -> Mapping[int, Exception | SystemExit]:

@@ -11,10 +11,8 @@ from hil.config.load import with_overrides
 from hil.control.laws.hold import HoldAtGoal
 from hil.control.laws.parts import (
     WithoutFeedForward,
-    WithoutGamma,
-    WithoutKappa,
     has_block,
-    replace_block,
+    leave_out,
 )
 from hil.core.errors import BadInput
 from hil.core.registries import ESTIMATORS, OUTER_LAWS
@@ -31,7 +29,9 @@ _BY_GAIN = {
     "integral": "ki_s4",
     "start": "zeta_start_m_s2",
 }
-_BY_BLOCK: Mapping[str, Any] = {"kappa": WithoutKappa, "gamma": WithoutGamma}
+# Gains that go to zero with it: what (2.9) adds to alpha is of the same term.
+_BESIDE = {"alpha": ("gamma0_m_s3", "gamma1_s3", "gamma2_s2")}
+_BY_BLOCK = ("kappa", "gamma")
 _BY_LIMIT: Mapping[str, Mapping[str, float | None]] = {
     "restrictions": {"approach_speed_m_s": None, "approach_accel_m_s2": None},
     "lead": {"lead_s": 0.0},
@@ -120,7 +120,10 @@ def _changed(scenario: Scenario, outer: str, without: str) -> Scenario:
         return with_overrides(scenario, [f"control.estimator={_BY_ESTIMATOR[without]}"])
     if without in _BY_GAIN:
         name = control.gain_set
-        gains = control.active_gains.with_values(OUTER_LAWS.get(outer), {_BY_GAIN[without]: 0.0})
+        entry = OUTER_LAWS.get(outer)
+        fields = entry.settings.model_fields if entry.settings is not None else {}
+        off = [_BY_GAIN[without], *(gain for gain in _BESIDE.get(without, ()) if gain in fields)]
+        gains = control.active_gains.with_values(entry, dict.fromkeys(off, 0.0))
         sets = control.gains.model_copy(update={name: gains})
         return scenario.model_copy(update={"control": control.model_copy(update={"gains": sets})})
     return scenario
@@ -135,5 +138,5 @@ def _law_without(scenario: Scenario, outer: str, without: str) -> Any:
     if without == "feed-forward":
         law = WithoutFeedForward(law)
     else:
-        replace_block(law, _BY_BLOCK[without])
+        leave_out(law, without)
     return HoldAtGoal(law, control.limits) if entry.extra.get("hold", True) else law

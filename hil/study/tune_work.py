@@ -20,11 +20,12 @@ from hil.analysis.costs import COST_WEIGHTS, Figures
 from hil.config.control import ControlConfig, PointReference
 from hil.config.deck import CALM, Cell, Deck, load_deck
 from hil.config.gains import Gains, only_gains_of
-from hil.config.load import build, builtin_names, load_robot, load_scenario
+from hil.config.load import builtin_names, load_scenario
 from hil.config.scenario import Scenario
 from hil.core.errors import BadInput
 from hil.core.files import read_toml
 from hil.core.registries import OUTER_LAWS, TUNING_COSTS, source_digests
+from hil.core.toml_text import toml_value
 from hil.study.suite import refuse_seen, spread_over
 from hil.study.tune import (
     CASES,
@@ -88,7 +89,7 @@ class Tasks:
     @property
     def trees(self) -> dict[str, Any]:
         """Return every resolved value of the scenarios."""
-        return {name: task.model_dump(mode="json") for name, task in self.scenarios.items()}
+        return _trees(self.scenarios)
 
     def cases(self) -> tuple[Case, ...]:
         """Return the runs of a candidate: the usual ones, or each task in all its variants.
@@ -113,12 +114,23 @@ class Tasks:
         return tuple(found)
 
 
+def _trees(scenarios: Mapping[str, Scenario]) -> dict[str, Any]:
+    return {name: task.model_dump(mode="json") for name, task in scenarios.items()}
+
+
 def load_tasks(names: Sequence[str], robot: str | None, overrides: Sequence[str] = ()) -> Tasks:
     """Return the tasks of scenario names or files, or of one deck; the usual ones without any.
 
-    `robot` is a built-in robot or a file, which takes the place of each scenario's own. Raises
+    `robot` is a built-in robot or a file, which takes the place of each scenario's own, as `--set
+    robot.file` does: with its board and gains, below what else is set and below a deck's conditions. Raises
     BadInput.
     """
+    if robot is not None:
+        if twice := [text for text in overrides if text.partition("=")[0].strip() == "robot.file"]:
+            raise BadInput(
+                f"--robot {robot}, --set {twice[0]}: both name the robot; give one of them"
+            )
+        overrides = (f"robot.file={toml_value(robot)}", *overrides)
     if len(names) == 1 and _is_deck(names[0]):
         deck = load_deck(names[0])
         if deck.conditions:
@@ -127,20 +139,13 @@ def load_tasks(names: Sequence[str], robot: str | None, overrides: Sequence[str]
     own = bool(names or robot or overrides)
     scenarios: dict[str, Scenario] = {}
     for name in names or HELD_OUT_SCENARIOS:
-        task = _on_robot(load_scenario(name, overrides), robot)
+        task = load_scenario(name, overrides)
         if task.name in scenarios or task.name == ALL_SCENARIOS:
             raise BadInput(
                 f"{name}: its name = {task.name!r} is taken; give each scenario a name of its own"
             )
         scenarios[task.name] = task
     return Tasks(scenarios, own, robot)
-
-
-def _on_robot(task: Scenario, robot: str | None) -> Scenario:
-    if robot is None:
-        return task
-    tree = task.model_dump(mode="json") | {"robot": load_robot(robot).model_dump(mode="json")}
-    return build(Scenario, tree, task.name)
 
 
 def _of_deck(deck: Deck, name: str, robot: str | None, overrides: Sequence[str]) -> Tasks:
@@ -154,7 +159,7 @@ def _of_deck(deck: Deck, name: str, robot: str | None, overrides: Sequence[str])
     refuse_seen(deck.unseen_cells(), deck.search_cells())
 
     def loaded(cells: Sequence[Cell]) -> dict[str, Scenario]:
-        found = (_on_robot(deck.scenario_of(cell, overrides), robot) for cell in cells)
+        found = (deck.scenario_of(cell, overrides) for cell in cells)
         return {task.name: task for task in found}
 
     calm = loaded([Cell(scenario=name, condition=CALM) for name in deck.scenarios])
@@ -278,7 +283,7 @@ def identity_of(
         "seed": plan.search_seed,
         "seeds": list(plan.seeds),
         "population": plan.population,
-        "tasks": _digest([only_gains_of(tree, laws) for tree in tasks.trees.values()]),
+        "tasks": _digest([only_gains_of(tree, laws) for tree in _trees(tasks.known).values()]),
         "gains kept": _digest(_tables_of(tasks.base, laws)),
         "procedure": _digest(searched),
         "program": program,

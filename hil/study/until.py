@@ -6,6 +6,7 @@ The interval is looked at after 24 repeats, then each time there are half as man
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Self
 from hil.analysis.multiple import looks, narrow_enough
 from hil.core.errors import BadInput
 from hil.core.figures import require_known
+from hil.report.compare import is_judged
 from hil.rigs.opening import is_simulated
 
 if TYPE_CHECKING:
@@ -69,12 +71,12 @@ class Until:
 
 
 def _values(records: Sequence[RunRecord], figure: str) -> dict[str, dict[Arm, dict[int, float]]]:
-    """Return the figure by scenario, arm and seed."""
+    """Return the figure by scenario, arm and seed; NaN of a run whose pair the report leaves out."""
     found: dict[str, dict[Arm, dict[int, float]]] = {}
     for record in records:
         manifest = record.manifest
         arm = (manifest.outer, manifest.inner)
-        value = record.figures().values[figure]
+        value = record.figures().values[figure] if is_judged(record) else math.nan
         by_arm = found.setdefault(manifest.scenario_name, {})
         by_arm.setdefault(arm, {})[manifest.seed] = value
     return found

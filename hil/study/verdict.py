@@ -33,6 +33,7 @@ from hil.study.suite import (
     together,
 )
 from hil.study.tune import boxes_of
+from hil.study.verdict_words import BASELINE
 
 if TYPE_CHECKING:
     from hil.config.deck import Deck
@@ -110,16 +111,20 @@ class Field:
 
     @classmethod
     def of(cls, deck_name: str, plan: VerdictPlan, laws: Sequence[str] = ()) -> Field:
-        """Return the field of a deck; raises BadInput where nothing unseen is left to judge on."""
+        """Return the field of a deck; raises BadInput where nothing unseen is left to judge on.
+
+        Some `laws` alone are judged beside the one that all are compared with; without any, all are.
+        """
         deck = load_deck(deck_name)
         seen = spread_over(deck.search_cells(), plan.search_cells)
         unseen = spread_over(deck.unseen_cells(), plan.unseen_cells)
         ablated = spread_over(deck.unseen_cells(), plan.ablation_cells)
         refuse_seen([*unseen, *ablated] or deck.cells(), seen)
         every = [*seen, *unseen, *ablated]
+        named = [OUTER_LAWS.get(law).name for law in laws] or laws_in_the_field()
         return cls(
             deck,
-            tuple(laws) or tuple(laws_in_the_field()),
+            tuple(dict.fromkeys(named if BASELINE in named else (BASELINE, *named))),
             scenarios_of(deck, every),
             tuple(map(str, seen)),
             tuple(map(str, unseen)),

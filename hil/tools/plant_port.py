@@ -25,23 +25,24 @@ _GRAVITY_M_S2 = 9.81
 
 
 class Numbers(NamedTuple):
-    """What a step needs of the robot, quotients worked out: `Plant::Derived`."""
+    """What a step needs of the robot, worked out: `twin::Terms`."""
 
-    mass_kg: float
     half_track_m: float
     d0_m: float
-    wheel_radius_m: float
-    front_axle_m: float
-    rear_axle_m: float
+    front_arm_m: float
+    rear_arm_m: float
+    mass_arm_kg_m: float
     motors: float
-    motor_resistance_ohm: float
-    coulomb_n_m: float
-    above_coulomb_n_m: float
-    gear_loss_ratio: float
-    viscous_n_m_s_rad: float
     bridge_drop_v: float
-    bridge_resistance_ohm: float
+    resistance_ohm: float
     bridge_smoothing2_a2: float
+    emf_v_s_m: float
+    drive_n_a: float
+    loss_n_a: float
+    steady_n: float
+    viscous_n_s_m: float
+    stribeck_n_m2_s2: float
+    stribeck2_m2_s2: float
     empty_v: float
     span_v: float
     battery_resistance_ohm: float
@@ -49,13 +50,9 @@ class Numbers(NamedTuple):
     smoothing2_m2_s2: float
     per_radius: float
     per_inductance: float
-    per_stribeck: float
     per_charge: float
-    emf_v_s: float
-    gear_n_m_a: float
-    roll_n: float
-    slide_front_n: float
-    slide_rear_n: float
+    front_scrub_n_m: float
+    rear_scrub_n_m: float
     per_mass_rim: float
     per_inertia_rim: float
 
@@ -68,22 +65,27 @@ def numbers_of(robot: RobotConfig) -> Numbers:
     weight_n = p.mass_kg * _GRAVITY_M_S2
     slide_n = p.floor_friction_ratio * weight_n / (p.front_axle_m + p.rear_axle_m)
     turned_kg_m2 = p.inertia_kg_m2 + p.mass_kg * p.d0_m**2 + 0.25 * p.track_m**2 * rim_kg
+    at_rim = p.motor_per_side / p.wheel_radius_m
+    drive_n_a = p.motor_torque_constant_n_m_a * p.motor_gear_ratio * at_rim
+    stribeck2 = (p.motor_stribeck_rad_s * p.wheel_radius_m) ** 2
+    front_arm_m, rear_arm_m = p.front_axle_m - p.d0_m, p.rear_axle_m + p.d0_m
     return Numbers(
-        mass_kg=p.mass_kg,
         half_track_m=0.5 * p.track_m,
         d0_m=p.d0_m,
-        wheel_radius_m=p.wheel_radius_m,
-        front_axle_m=p.front_axle_m,
-        rear_axle_m=p.rear_axle_m,
+        front_arm_m=front_arm_m,
+        rear_arm_m=rear_arm_m,
+        mass_arm_kg_m=p.mass_kg * p.d0_m,
         motors=p.motor_per_side,
-        motor_resistance_ohm=p.motor_resistance_ohm,
-        coulomb_n_m=p.motor_coulomb_n_m,
-        above_coulomb_n_m=p.motor_stiction_n_m - p.motor_coulomb_n_m,
-        gear_loss_ratio=1.0 - p.motor_gear_efficiency_ratio,
-        viscous_n_m_s_rad=p.motor_viscous_n_m_s_rad,
         bridge_drop_v=p.bridge_drop_v,
-        bridge_resistance_ohm=p.bridge_resistance_ohm,
-        bridge_smoothing2_a2=p.bridge_smoothing_a**2,
+        resistance_ohm=p.motor_resistance_ohm + p.motor_per_side * p.bridge_resistance_ohm,
+        bridge_smoothing2_a2=(p.bridge_smoothing_a / p.motor_per_side) ** 2,
+        emf_v_s_m=p.motor_emf_constant_v_s_rad * p.motor_gear_ratio / p.wheel_radius_m,
+        drive_n_a=drive_n_a,
+        loss_n_a=(1.0 - p.motor_gear_efficiency_ratio) * drive_n_a,
+        steady_n=p.motor_coulomb_n_m * at_rim + 0.5 * p.floor_rolling_ratio * weight_n,
+        viscous_n_s_m=p.motor_viscous_n_m_s_rad * at_rim / p.wheel_radius_m,
+        stribeck_n_m2_s2=(p.motor_stiction_n_m - p.motor_coulomb_n_m) * at_rim * stribeck2,
+        stribeck2_m2_s2=stribeck2,
         empty_v=p.battery_empty_v,
         span_v=p.battery_full_v - p.battery_empty_v,
         battery_resistance_ohm=p.battery_resistance_ohm,
@@ -91,13 +93,9 @@ def numbers_of(robot: RobotConfig) -> Numbers:
         smoothing2_m2_s2=p.floor_smoothing_m_s**2,
         per_radius=1.0 / p.wheel_radius_m,
         per_inductance=1.0 / p.motor_inductance_h,
-        per_stribeck=1.0 / p.motor_stribeck_rad_s,
         per_charge=1.0 / (3600.0 * p.battery_capacity_a_h),
-        emf_v_s=p.motor_emf_constant_v_s_rad * p.motor_gear_ratio,
-        gear_n_m_a=p.motor_torque_constant_n_m_a * p.motor_gear_ratio,
-        roll_n=0.5 * p.floor_rolling_ratio * weight_n,
-        slide_front_n=slide_n * p.rear_axle_m,
-        slide_rear_n=slide_n * p.front_axle_m,
+        front_scrub_n_m=front_arm_m * slide_n * p.rear_axle_m,
+        rear_scrub_n_m=rear_arm_m * slide_n * p.front_axle_m,
         per_mass_rim=1.0 / (p.mass_kg + rim_kg),
         per_inertia_rim=1.0 / turned_kg_m2,
     )
@@ -132,71 +130,70 @@ def make_step(f: Functions, made: Callable[[Any], Any] = _as_it_is) -> Step:  # 
     """
     root, size, not_below_0, cos, sin = f
 
-    def motor(p: Numbers, amps: Any, omega: Any, duty: Any, supply_v: Any) -> Any:
-        """Return rate of the current (A/s), torque (N m) and smoothed sign of one side."""
-        channel = p.motors * amps
-        drop_v = (
-            p.bridge_drop_v * (channel / root(channel * channel + p.bridge_smoothing2_a2))
-            + p.bridge_resistance_ohm * channel
+    def side(p: Numbers, amps: Any, rim: Any, slide: Any) -> Any:
+        """Return soft signs of a current and of an axle's sliding, and friction at a rim (N)."""
+        bridge2 = amps * amps + p.bridge_smoothing2_a2
+        slide2 = slide * slide + p.smoothing2_m2_s2
+        rim2 = rim * rim
+        roll2, stribeck2 = rim2 + p.smoothing2_m2_s2, rim2 + p.stribeck2_m2_s2
+        others2, dry2 = bridge2 * slide2, roll2 * stribeck2
+        per_all = 1.0 / (dry2 * others2)
+        dry = (p.steady_n + p.loss_n_a * size(amps)) * stribeck2 + p.stribeck_n_m2_s2
+        return (
+            amps * slide2 * dry2 * root(bridge2) * per_all,
+            slide * bridge2 * dry2 * root(slide2) * per_all,
+            rim * dry * others2 * root(roll2) * per_all,
         )
-        gear = p.gear_n_m_a * amps
-        rim = omega * p.wheel_radius_m
-        sign = rim / root(rim * rim + p.smoothing2_m2_s2)
-        ratio = omega * p.per_stribeck
-        dry = (
-            p.coulomb_n_m
-            + p.above_coulomb_n_m / (1.0 + ratio * ratio)
-            + p.gear_loss_ratio * size(gear)
+
+    side = made(side)
+
+    def motor(
+        p: Numbers, amps: Any, sign: Any, rim: Any, dry: Any, duty: Any, supply_v: Any
+    ) -> Any:
+        """Return rate of the current (A/s) and force at the rim (N) of one side."""
+        left_v = (
+            duty * supply_v - p.emf_v_s_m * rim - p.resistance_ohm * amps - p.bridge_drop_v * sign
         )
-        friction = sign * dry + p.viscous_n_m_s_rad * omega
-        left_v = duty * supply_v - drop_v - p.emf_v_s * omega - p.motor_resistance_ohm * amps
-        return p.per_inductance * left_v, p.motors * (gear - friction), sign
+        return p.per_inductance * left_v, p.drive_n_a * amps - p.viscous_n_s_m * rim - dry
 
     motor = made(motor)
 
     def slope(x: Any, p: Numbers, c: Any, s: Any, duty_left: Any, duty_right: Any) -> Any:
-        """Return the state's rate, at a heading of cosine c and sine s."""
-        _, _, _, eta1, eta2, turn, left_a, right_a, _, _, left_w, right_w, charge = x
+        """Return the state's rate, at a heading of cosine c and sine s; of what follows, nothing."""
+        _, _, _, eta1, turn, left_a, right_a, _, _, charge = x
         drawn_a = p.idle_a + p.motors * (duty_left * left_a + duty_right * right_a)
         supply_v = not_below_0(p.empty_v + p.span_v * charge - p.battery_resistance_ohm * drawn_a)
-        left_rate, left_n_m, left_sign = motor(p, left_a, left_w, duty_left, supply_v)
-        right_rate, right_n_m, right_sign = motor(p, right_a, right_w, duty_right, supply_v)
-        left_n = left_n_m * p.per_radius - p.roll_n * left_sign
-        right_n = right_n_m * p.per_radius - p.roll_n * right_sign
-        front_v, rear_v = eta2 + p.front_axle_m * turn, eta2 - p.rear_axle_m * turn
-        front_n = p.slide_front_n * (front_v / root(front_v * front_v + p.smoothing2_m2_s2))
-        rear_n = p.slide_rear_n * (rear_v / root(rear_v * rear_v + p.smoothing2_m2_s2))
-        scrub_n_m = p.front_axle_m * front_n - p.rear_axle_m * rear_n
-        turn_n_m = p.half_track_m * (right_n - left_n) - scrub_n_m
-        forward_n = left_n + right_n + p.mass_kg * eta2 * turn
-        eta1_rate = forward_n * p.per_mass_rim
-        moment = turn_n_m + p.d0_m * (front_n + rear_n + p.mass_kg * eta1 * turn)
-        turn_rate = moment * p.per_inertia_rim
-        aside = p.half_track_m * turn_rate
+        eta2, aside = -p.d0_m * turn, p.half_track_m * turn
+        left_v, right_v = eta1 - aside, eta1 + aside
+        left_sign, front_sign, left_dry = side(p, left_a, left_v, p.front_arm_m * turn)
+        right_sign, rear_sign, right_dry = side(p, right_a, right_v, -p.rear_arm_m * turn)
+        left_rate, left_n = motor(p, left_a, left_sign, left_v, left_dry, duty_left, supply_v)
+        right_rate, right_n = motor(
+            p, right_a, right_sign, right_v, right_dry, duty_right, supply_v
+        )
+        scrub_n_m = p.front_scrub_n_m * front_sign - p.rear_scrub_n_m * rear_sign
+        turn_n_m = p.mass_arm_kg_m * (eta1 * turn) - scrub_n_m
+        moment = p.half_track_m * (right_n - left_n) + turn_n_m
         return (
             c * eta1 - s * eta2,
             s * eta1 + c * eta2,
             turn,
-            eta1_rate,
-            -p.d0_m * turn_rate,
-            turn_rate,
+            (left_n + right_n - p.mass_arm_kg_m * (turn * turn)) * p.per_mass_rim,
+            moment * p.per_inertia_rim,
             left_rate,
             right_rate,
-            left_w,
-            right_w,
-            (eta1_rate - aside) * p.per_radius,
-            (eta1_rate + aside) * p.per_radius,
+            left_v * p.per_radius,
+            right_v * p.per_radius,
             -p.per_charge * drawn_a,
         )
 
     slope = made(slope)
 
     def moved(x: Any, h: Any, k: Any) -> Any:
-        """Return x + h k."""
+        """Return x + h k, of what a slope looks at."""
         return (
-            x[0] + h * k[0], x[1] + h * k[1], x[2] + h * k[2], x[3] + h * k[3], x[4] + h * k[4],
-            x[5] + h * k[5], x[6] + h * k[6], x[7] + h * k[7], x[8] + h * k[8], x[9] + h * k[9],
-            x[10] + h * k[10], x[11] + h * k[11], x[12] + h * k[12],
+            x[0], x[1], x[2] + h * k[2], x[3] + h * k[3], x[4] + h * k[4], x[5] + h * k[5],
+            x[6] + h * k[6], x[7], x[8], x[9] + h * k[9],
         )  # fmt: skip
 
     moved = made(moved)
@@ -204,7 +201,7 @@ def make_step(f: Functions, made: Callable[[Any], Any] = _as_it_is) -> Step:  # 
     def turned(x: Any, p: Numbers, c: Any, s: Any, by: Any, duties: Any) -> Any:
         """Return the rate of a state turned by `by` from cosine c and sine s: the series of both."""
         d2 = by * by
-        less = d2 * (0.5 - d2 * (1.0 / 24.0 - d2 * (1.0 / 720.0)))
+        less = d2 * (0.5 - d2 * (1.0 / 24.0))
         sine = by * (1.0 - d2 * (1.0 / 6.0 - d2 * (1.0 / 120.0)))
         return slope(
             x, p, c - (c * less + s * sine), s - (s * less - c * sine), duties[0], duties[1]
@@ -212,14 +209,18 @@ def make_step(f: Functions, made: Callable[[Any], Any] = _as_it_is) -> Step:  # 
 
     turned = made(turned)
 
-    def mean(k1: Any, k2: Any, k3: Any, k4: Any) -> Any:
-        """Return six times the mean slope."""
-        return k1 + 2.0 * (k2 + k3) + k4
+    def ahead(x: Any, sixth: Any, k1: Any, k2: Any, k3: Any, k4: Any) -> Any:
+        """Return a number of the state a step later, from its four slopes."""
+        return x + sixth * (k1 + 2.0 * (k2 + k3) + k4)
 
-    mean = made(mean)
+    ahead = made(ahead)
 
-    def step(x: Any, p: Numbers, h: Any, duty_left: Any, duty_right: Any) -> Any:
+    def step(whole: Any, p: Numbers, h: Any, duty_left: Any, duty_right: Any) -> Any:
         """Return the state a step later."""
+        x = (
+            whole[0], whole[1], whole[2], whole[3], whole[5], whole[6], whole[7], whole[8],
+            whole[9], whole[12],
+        )  # fmt: skip
         theta = x[2]
         c, s = cos(theta), sin(theta)
         duties = (duty_left, duty_right)
@@ -231,23 +232,23 @@ def make_step(f: Functions, made: Callable[[Any], Any] = _as_it_is) -> Step:  # 
         x4 = moved(x, h, k3)
         k4 = turned(x4, p, c, s, x4[2] - theta, duties)
         sixth = h / 6.0
-        eta1 = x[3] + sixth * mean(k1[3], k2[3], k3[3], k4[3])
-        turn = x[5] + sixth * mean(k1[5], k2[5], k3[5], k4[5])
+        eta1 = ahead(x[3], sixth, k1[3], k2[3], k3[3], k4[3])
+        turn = ahead(x[4], sixth, k1[4], k2[4], k3[4], k4[4])
         aside = p.half_track_m * turn
         return (
-            x[0] + sixth * mean(k1[0], k2[0], k3[0], k4[0]),
-            x[1] + sixth * mean(k1[1], k2[1], k3[1], k4[1]),
-            x[2] + sixth * mean(k1[2], k2[2], k3[2], k4[2]),
+            ahead(x[0], sixth, k1[0], k2[0], k3[0], k4[0]),
+            ahead(x[1], sixth, k1[1], k2[1], k3[1], k4[1]),
+            ahead(x[2], sixth, k1[2], k2[2], k3[2], k4[2]),
             eta1,
             -p.d0_m * turn,
             turn,
-            x[6] + sixth * mean(k1[6], k2[6], k3[6], k4[6]),
-            x[7] + sixth * mean(k1[7], k2[7], k3[7], k4[7]),
-            x[8] + sixth * mean(k1[8], k2[8], k3[8], k4[8]),
-            x[9] + sixth * mean(k1[9], k2[9], k3[9], k4[9]),
+            ahead(x[5], sixth, k1[5], k2[5], k3[5], k4[5]),
+            ahead(x[6], sixth, k1[6], k2[6], k3[6], k4[6]),
+            ahead(x[7], sixth, k1[7], k2[7], k3[7], k4[7]),
+            ahead(x[8], sixth, k1[8], k2[8], k3[8], k4[8]),
             (eta1 - aside) * p.per_radius,
             (eta1 + aside) * p.per_radius,
-            x[12] + sixth * mean(k1[12], k2[12], k3[12], k4[12]),
+            ahead(x[9], sixth, k1[9], k2[9], k3[9], k4[9]),
         )
 
     return made(step)  # type: ignore[no-any-return]

@@ -41,8 +41,8 @@ double noise(std::uint64_t seed, double t_s, double frequency_hz) {
 double shape_value(const Disturbance& d, double t_s) {
   const double since_s = t_s - d.start_s;
   switch (d.shape) {
-    case Shape::kSine: return std::sin(2.0 * kPi * d.frequency_hz * since_s + d.phase_rad);
-    case Shape::kPulse: return std::sin(kPi * since_s / (d.end_s - d.start_s));
+    case Shape::kSine: return direction(2.0 * kPi * d.frequency_hz * since_s + d.phase_rad).sin;
+    case Shape::kPulse: return direction(kPi * since_s / (d.end_s - d.start_s)).sin;
     case Shape::kNoise: return noise(d.seed, since_s, d.frequency_hz);
     case Shape::kStep: break;
   }
@@ -52,7 +52,8 @@ double shape_value(const Disturbance& d, double t_s) {
 double zone_weight(const Disturbance& d, double x_m, double y_m) {
   if (d.zone_radius_m <= 0.0) return 1.0;
   constexpr double kEdge_m = 0.01;
-  const double inside_m = d.zone_radius_m - std::hypot(x_m - d.zone_x_m, y_m - d.zone_y_m);
+  const double dx_m = x_m - d.zone_x_m, dy_m = y_m - d.zone_y_m;
+  const double inside_m = d.zone_radius_m - std::sqrt(dx_m * dx_m + dy_m * dy_m);
   return 0.5 + 0.5 * inside_m / std::sqrt(inside_m * inside_m + kEdge_m * kEdge_m);
 }
 

@@ -46,5 +46,10 @@ using LaneRun = void (*)(void* block, int first, int steps, bool loaded);
 void run_two(void* block, int first, int steps, bool loaded);
 void run_four(void* block, int first, int steps, bool loaded);   // x86 with AVX2
 void run_eight(void* block, int first, int steps, bool loaded);  // x86 with AVX-512
+// Of as many angles as there are lanes.
+using LaneDirect = void (*)(const double* angle_rad, double* cos, double* sin);
+void direct_two(const double* angle_rad, double* cos, double* sin);
+void direct_four(const double* angle_rad, double* cos, double* sin);
+void direct_eight(const double* angle_rad, double* cos, double* sin);
 
 }  // namespace twin

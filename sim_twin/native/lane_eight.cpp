@@ -2,8 +2,6 @@
 #ifdef __AVX512F__
 #include <immintrin.h>
 
-#include <cstdint>
-
 namespace {
 
 // What is left of the exponent of v when the value is taken down by `by` powers of two; for a power of two itself
@@ -13,44 +11,31 @@ namespace {
   return _mm512_castsi512_pd(_mm512_and_si512(taken, _mm512_set1_epi64(0x7ff0000000000000LL)));
 }
 
-// v / sqrt(x), root and quotient each rounded to nearest as by the processor's own instructions, in half of their
-// time: by Newton's iteration, and then proven. With fused operations the remainders x - s s and v - q s are
-// exact; a root or quotient is the nearest number where its remainder is less than half a unit of its last place
-// makes it. Returns whether it is proven for all eight: not for numbers so small that remainders round.
-[[gnu::always_inline]] inline bool proven_over_root(__m512d v, __m512d x, __m512d& out) {
+// sqrt(x) rounded to nearest as by the processor's own instruction, without the divider, which a step waits for
+// most: by Newton's iteration, and then proven. With a fused operation the remainder x - s s is exact; s is the
+// nearest number where the remainder is less than half a unit of its last place makes it. Returns whether it is
+// proven for all eight: not for numbers so small that remainders round.
+[[gnu::always_inline]] inline bool proven_root(__m512d x, __m512d& out) {
   const __m512d half = _mm512_set1_pd(0.5);
   const __m512d guess = _mm512_rsqrt14_pd(x);
   __m512d g = _mm512_mul_pd(x, guess), h = _mm512_mul_pd(half, guess);  // to sqrt(x), 0.5 / sqrt(x)
-  for (int i = 0; i < 2; ++i) {
-    const __m512d r = _mm512_fnmadd_pd(g, h, half);
-    g = _mm512_fmadd_pd(g, r, g);
-    h = _mm512_fmadd_pd(h, r, h);
-  }
-  const __m512d s = _mm512_fmadd_pd(_mm512_fnmadd_pd(g, g, x), h, g);
-  const __m512d per_s = _mm512_add_pd(h, h);
-  const __m512d first = _mm512_mul_pd(v, per_s);
-  const __m512d q = _mm512_fmadd_pd(_mm512_fnmadd_pd(first, s, v), per_s, first);
-
-  const __m512d root_left = _mm512_abs_pd(_mm512_fnmadd_pd(s, s, x));
-  const __m512d left = _mm512_abs_pd(_mm512_fnmadd_pd(q, s, v));
-  __mmask8 sure = _mm512_cmp_pd_mask(root_left, _mm512_mul_pd(s, scale(s, 52)), _CMP_LT_OQ);
-  sure = _mm512_mask_cmp_pd_mask(sure, left, _mm512_mul_pd(s, scale(q, 53)), _CMP_LT_OQ);
-  sure = _mm512_mask_cmp_pd_mask(sure, x, _mm512_set1_pd(0x1p-800), _CMP_GE_OQ);
-  // |v| >= 2^-400, or 0, which taking one away makes the largest of all
-  const __m512i size = _mm512_and_si512(_mm512_castpd_si512(v), _mm512_set1_epi64(0x7fffffffffffffffLL));
-  sure = _mm512_mask_cmp_epu64_mask(sure, _mm512_sub_epi64(size, _mm512_set1_epi64(1)),
-                                    _mm512_castpd_si512(_mm512_set1_pd(0x1p-400)), _MM_CMPINT_NLT);
-  // The sign of -0 has been lost on the way.
-  const __m512i sign = _mm512_and_si512(_mm512_castpd_si512(v), _mm512_set1_epi64(INT64_MIN));
-  out = _mm512_castsi512_pd(_mm512_or_si512(_mm512_castpd_si512(q), sign));
-  return sure == 0xff;
+  // 1 / sqrt(1 - 2 r) = 1 + r + 3/2 r^2 + ..: from 14 bits to 40
+  const __m512d r = _mm512_fnmadd_pd(g, h, half);
+  const __m512d more = _mm512_fmadd_pd(_mm512_mul_pd(r, _mm512_set1_pd(1.5)), r, r);
+  g = _mm512_fmadd_pd(g, more, g);
+  h = _mm512_fmadd_pd(h, more, h);
+  out = _mm512_fmadd_pd(_mm512_fnmadd_pd(g, g, x), h, g);
+  const __m512d left = _mm512_abs_pd(_mm512_fnmadd_pd(out, out, x));
+  const __mmask8 sure = _mm512_cmp_pd_mask(left, _mm512_mul_pd(out, scale(out, 52)), _CMP_LT_OQ);
+  return _mm512_mask_cmp_pd_mask(sure, x, _mm512_set1_pd(0x1p-800), _CMP_GE_OQ) == 0xff;
 }
 
 }  // namespace
 
 #define TWIN_ROOT(v) _mm512_sqrt_pd(v)
-#define TWIN_OVER_ROOT proven_over_root
+#define TWIN_PROVEN_ROOT proven_root
 #define TWIN_LANES 8
 #define TWIN_RUN run_eight
+#define TWIN_DIRECT direct_eight
 #include "lane_run.hpp"
 #endif

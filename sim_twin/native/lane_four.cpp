@@ -4,5 +4,6 @@
 #define TWIN_ROOT(v) _mm256_sqrt_pd(v)
 #define TWIN_LANES 4
 #define TWIN_RUN run_four
+#define TWIN_DIRECT direct_four
 #include "lane_run.hpp"
 #endif

@@ -1,7 +1,8 @@
 // The steps of one width, compiled for the processors that have it: a unit defines TWIN_LANES (robots side by
-// side), TWIN_ROOT (square roots of a register), TWIN_OVER_ROOT where it has a faster way to quotients by them, and
-// TWIN_RUN (the function's name), and takes this in. All but that function belongs to the unit alone.
+// side), TWIN_ROOT (square roots of a register), TWIN_PROVEN_ROOT where it has another way to them that may fail,
+// TWIN_RUN and TWIN_DIRECT (the functions' names), and takes this in. All but those functions belongs to the unit alone.
 #include <cmath>
+#include <cstring>
 
 #include "lane_block.hpp"
 
@@ -30,6 +31,7 @@ TWIN_EACH(/)
 TWIN_INLINE V sum(const Two& a) { return a.v[0] + a.v[1]; }
 
 using Mask = decltype(V{} < V{});
+typedef std::uint64_t Bits __attribute__((vector_size(sizeof(V))));
 
 TWIN_INLINE bool any_of(const Mask& mask) {
   long long any = 0;
@@ -42,25 +44,27 @@ struct Many {
   using Number = V;
   using Pair = Two;
   using Flag = Mask;
+  using Bits = twin::Bits;
   struct Loads {
     V v[kLoads];
     TWIN_INLINE const V& operator[](int load) const { return v[load]; }
   };
 
   TWIN_INLINE static Two pair(const V& first, const V& second) { return {{first, second}}; }
+  TWIN_INLINE static Bits bits_of(const V& v) { return (Bits)v; }
+  TWIN_INLINE static V number_of(const Bits& bits) { return (V)bits; }
   TWIN_INLINE static V root(const V& v) { return TWIN_ROOT(v); }
-  TWIN_INLINE static Two root(const Two& v) { return {{TWIN_ROOT(v.v[0]), TWIN_ROOT(v.v[1])}}; }
-  // v over the root of x. Where there is another way than the divider, which is what a step waits for most, one
-  // half goes each way.
-  TWIN_INLINE static Two over_root(const Two& v, const Two& x) {
-#ifdef TWIN_OVER_ROOT
+  // Where there is another way than the divider, one half goes each way.
+  TWIN_INLINE static Two root(const Two& v) {
+#ifdef TWIN_PROVEN_ROOT
     Two out;
-    const bool sure = TWIN_OVER_ROOT(v.v[1], x.v[1], out.v[1]);
-    out.v[0] = v.v[0] / TWIN_ROOT(x.v[0]);
+    const bool sure = TWIN_PROVEN_ROOT(v.v[1], out.v[1]);
+    out.v[0] = TWIN_ROOT(v.v[0]);
     if (__builtin_expect(sure, true)) return out;
 #endif
-    return v / root(x);
+    return {{TWIN_ROOT(v.v[0]), TWIN_ROOT(v.v[1])}};
   }
+  TWIN_INLINE static Two inverse(const Two& v) { return 1.0 / v; }
   TWIN_INLINE static V magnitude(const V& v) {
     const Mask rest = (Mask)(V{} - 0.0) | 0x7fffffffffffffffLL;
     return (V)((Mask)v & rest);
@@ -96,6 +100,16 @@ struct Many {
       s[lane] = s_one;
     }
   }
+  TWIN_INLINE static void direct_where_far(const V& angle_rad, const V& size_rad, Direction<V>& out) {
+    const Mask near = size_rad < kNear_rad;
+    if (__builtin_expect(!any_of(~near), true)) return;
+    for (int lane = 0; lane < TWIN_LANES; ++lane) {
+      if (near[lane]) continue;
+      const Direction<double> one = direction_far(angle_rad[lane]);
+      out.cos[lane] = one.cos;
+      out.sin[lane] = one.sin;
+    }
+  }
 };
 
 // With loads the castor's part is always worked out, for those that have one.
@@ -120,10 +134,7 @@ TWIN_INLINE void run(Block& block, int first, int steps) {
                         {{x[kCharge], V{}}}}};
   V safe = V{} + 1.0;
   for (int step = first; step < first + steps; ++step) {
-    V cos, sin;
-    headings((const double*)&now[kTurn].v[0], (double*)&cos, (double*)&sin, TWIN_LANES);
-    now = model.advanced(now, {cos, sin}, {block.h_s, block.half_h_s, block.sixth_h_s}, loads[0], loads[1],
-                         loads[2]);
+    now = model.advanced(now, {block.h_s, block.half_h_s, block.sixth_h_s}, loads[0], loads[1], loads[2]);
     const Two size = Many<kCastors>::magnitude(now[kOmega]);
     safe = size[0] + size[1] < kRunaway_rad_s ? safe : V{};
     block.rows[step] = {now[kPosition][0], now[kPosition][1], now[kTurn][0], now[kWheel][0], now[kWheel][1]};
@@ -148,6 +159,14 @@ void TWIN_RUN(void* at, int first, int steps, bool loaded) {
   } else {
     run<false, Acts::kNothing>(block, first, steps);
   }
+}
+
+void TWIN_DIRECT(const double* angle_rad, double* cos, double* sin) {
+  V angle;
+  std::memcpy(&angle, angle_rad, sizeof angle);
+  const Direction<V> to = Directions<Many<false>>::of(angle);
+  std::memcpy(cos, &to.cos, sizeof to.cos);
+  std::memcpy(sin, &to.sin, sizeof to.sin);
 }
 
 }  // namespace twin

@@ -8,4 +8,5 @@
 #endif
 #define TWIN_LANES 2
 #define TWIN_RUN run_two
+#define TWIN_DIRECT direct_two
 #include "lane_run.hpp"

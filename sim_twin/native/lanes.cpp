@@ -284,4 +284,24 @@ void advance_together(Leg* legs, std::size_t n, Width width) {
   for (const std::size_t i : order) alone(legs[i]);
 }
 
+void directions(Width width, const double* angle_rad, double* cos, double* sin, std::size_t n) {
+  require_width(width);
+  const auto lanes = static_cast<std::size_t>(width);
+  if (n % lanes != 0) throw std::invalid_argument("a whole number of registers full");
+  LaneDirect direct = direct_two;
+#ifdef TWIN_WIDE_LANES
+  if (width == Width::kFour) direct = direct_four;
+  if (width == Width::kEight) direct = direct_eight;
+#endif
+  for (std::size_t i = 0; i < n; i += lanes) {
+    if (width != Width::kOne) {
+      direct(angle_rad + i, cos + i, sin + i);
+      continue;
+    }
+    const Direction<double> to = direction(angle_rad[i]);
+    cos[i] = to.cos;
+    sin[i] = to.sin;
+  }
+}
+
 }  // namespace twin

@@ -29,6 +29,9 @@ struct Leg {
 void advance_together(Leg* legs, std::size_t n);
 void advance_together(Leg* legs, std::size_t n, Width width);
 
+// Cosine and sine of each angle, as a step has them; n: a whole number of registers full.
+void directions(Width width, const double* angle_rad, double* cos, double* sin, std::size_t n);
+
 // Processor time in s that `runs` robots of this kind (a whole number of registers full) take for `steps` steps of
 // 1e-4 s each, driving under duties that change every 4 ms, without boards: the plant's share of the above.
 double plant_lane_time(const PlantParams& params, Width width, int runs, int steps);

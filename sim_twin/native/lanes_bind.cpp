@@ -1,5 +1,6 @@
 // Kernels side by side, for Python (sim_twin/_native.pyi).
 #include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
 #include <nanobind/stl/vector.h>
 
 #include <stdexcept>
@@ -47,6 +48,17 @@ nb::list advance_together(const std::vector<Kernel*>& kernels, const std::vector
   return out;
 }
 
+using Angles = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Numbers = nb::ndarray<nb::numpy, double, nb::ndim<1>>;
+
+nb::tuple directions(const Angles& angle_rad, int lanes) {
+  const std::size_t n = angle_rad.shape(0);
+  auto* const both = new double[2 * n];
+  const nb::capsule owner(both, [](void* p) noexcept { delete[] static_cast<double*>(p); });
+  twin::directions(static_cast<Width>(lanes), angle_rad.data(), both, both + n, n);
+  return nb::make_tuple(Numbers(both, {n}, owner), Numbers(both + n, {n}, owner));
+}
+
 }  // namespace
 
 void bind_lanes(nb::module_& m) {
@@ -57,5 +69,6 @@ void bind_lanes(nb::module_& m) {
         return twin::plant_lane_time(params, static_cast<Width>(lanes), runs, steps);
       },
       "params"_a, "lanes"_a, "runs"_a, "steps"_a);
+  m.def("directions", &directions, "angle_rad"_a, "lanes"_a);
   m.def("advance_together", &advance_together, "kernels"_a, "t_us"_a, "lanes"_a = 0);
 }

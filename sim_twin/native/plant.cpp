@@ -12,10 +12,11 @@ namespace {
 // Slope of a brake's torque through rest, as stiff as a jam of the gears (kernel.cpp).
 constexpr double kStiffest_n_m_s_rad = 12.0;
 constexpr LoadVector kNoLoads{};
+// Below, no speed at which friction falls by half makes a difference, and its square has to be a number.
+constexpr double kLeastStribeck_m_s = 1e-9;
 
 // One robot: its left and right side share a register.
-struct One {
-  using Number = double;
+struct One : Scalar {
   using Pair = twin::Pair;
   using Flag = bool;
   using Loads = LoadVector;
@@ -23,9 +24,9 @@ struct One {
   TWIN_INLINE static Pair pair(double first, double second) { return Pair{first, second}; }
   TWIN_INLINE static Pair root(Pair v) { return twin::root(v); }
   TWIN_INLINE static double root(double v) { return std::sqrt(v); }
-  TWIN_INLINE static Pair over_root(Pair v, Pair x) { return v / twin::root(x); }
+  TWIN_INLINE static Pair inverse(Pair v) { return 1.0 / v; }
+  using Scalar::magnitude;
   TWIN_INLINE static Pair magnitude(Pair v) { return twin::magnitude(v); }
-  TWIN_INLINE static double magnitude(double v) { return std::fabs(v); }
   TWIN_INLINE static double not_negative(double v) { return std::max(v, 0.0); }
   TWIN_INLINE static bool any(bool flag) { return flag; }
   template <class V>
@@ -65,17 +66,10 @@ TWIN_INLINE StateVector listed(const OneState& x) {
 
 }  // namespace
 
-void headings(const double* theta_rad, double* cos, double* sin, int n) {
-  for (int i = 0; i < n; ++i) {
-    const double at_rad = theta_rad[i];  // both of one number: the compiler has them worked out in one call
-    cos[i] = std::cos(at_rad);
-    sin[i] = std::sin(at_rad);
-  }
-}
-
 void turn_far(double by_rad, double& less, double& s) {
-  less = 1.0 - std::cos(by_rad);
-  s = std::sin(by_rad);
+  const Direction<double> by = direction(by_rad);
+  less = 1.0 - by.cos;
+  s = by.sin;
 }
 
 // Against the motion, with the soft middle of all friction here; softer for a strong brake, so that it is never
@@ -83,7 +77,7 @@ void turn_far(double by_rad, double& less, double& s) {
 double brake_torque(double torque_n_m, double omega_rad_s, double smooth_rad_s) {
   if (!(torque_n_m > 0.0)) return 0.0;
   const double soft_rad_s = std::max(smooth_rad_s, torque_n_m / kStiffest_n_m_s_rad);
-  return torque_n_m * omega_rad_s / std::hypot(omega_rad_s, soft_rad_s);
+  return torque_n_m * omega_rad_s / std::sqrt(omega_rad_s * omega_rad_s + soft_rad_s * soft_rad_s);
 }
 
 Plant::Plant(const PlantParams& params) : p_(params), t_(derive(params)) { reset(0.0, 0.0, 0.0); }
@@ -92,6 +86,10 @@ Terms<double> derive(const PlantParams& p) {
   const double rotor = p.motor_gear_ratio * p.motor_gear_ratio * p.motor_rotor_inertia_kg_m2;
   const double wheelbase_m = p.front_axle_m + p.rear_axle_m;
   const double weight_n = p.mass_kg * kGravity;
+  const double per_radius = 1.0 / p.wheel_radius_m;
+  const double at_rim = p.motor_per_side * per_radius;  // N of a side's rims per N m of a motor at the wheel
+  const double bridge_smoothing_a = p.bridge_smoothing_a / p.motor_per_side;
+  const double stribeck_m_s = std::max(p.motor_stribeck_rad_s * p.wheel_radius_m, kLeastStribeck_m_s);
   Terms<double> t{};
   t.mass_kg = p.mass_kg;
   t.inertia_kg_m2 = p.inertia_kg_m2;
@@ -100,29 +98,31 @@ Terms<double> derive(const PlantParams& p) {
   t.front_axle_m = p.front_axle_m;
   t.rear_axle_m = p.rear_axle_m;
   t.d0_m = p.d0_m;
+  t.front_arm_m = p.front_axle_m - p.d0_m;
+  t.rear_arm_m = p.rear_axle_m + p.d0_m;
+  t.mass_arm_kg_m = p.mass_kg * p.d0_m;
   t.motor_per_side = p.motor_per_side;
-  t.motor_resistance_ohm = p.motor_resistance_ohm;
-  t.motor_coulomb_n_m = p.motor_coulomb_n_m;
-  t.motor_viscous_n_m_s_rad = p.motor_viscous_n_m_s_rad;
   t.bridge_drop_v = p.bridge_drop_v;
-  t.bridge_resistance_ohm = p.bridge_resistance_ohm;
+  t.resistance_ohm = p.motor_resistance_ohm + p.motor_per_side * p.bridge_resistance_ohm;
+  t.bridge_smoothing2_a2 = bridge_smoothing_a * bridge_smoothing_a;
+  t.emf_v_s_m = p.motor_emf_constant_v_s_rad * p.motor_gear_ratio * per_radius;
+  t.drive_n_a = p.motor_torque_constant_n_m_a * p.motor_gear_ratio * at_rim;
+  t.loss_n_a = (1.0 - p.motor_gear_efficiency_ratio) * t.drive_n_a;
+  t.coulomb_n = p.motor_coulomb_n_m * at_rim;
+  t.viscous_n_s_m = p.motor_viscous_n_m_s_rad * at_rim * per_radius;
+  t.stribeck2_m2_s2 = stribeck_m_s * stribeck_m_s;
+  t.stribeck_n_m2_s2 = (p.motor_stiction_n_m - p.motor_coulomb_n_m) * at_rim * t.stribeck2_m2_s2;
   t.battery_empty_v = p.battery_empty_v;
+  t.battery_span_v = p.battery_full_v - p.battery_empty_v;
   t.battery_resistance_ohm = p.battery_resistance_ohm;
   t.battery_idle_a = p.battery_idle_a;
   t.floor_smoothing_m_s = p.floor_smoothing_m_s;
   t.floor_slip_smoothing_m_s = p.floor_slip_smoothing_m_s;
-  t.bridge_smoothing2_a2 = p.bridge_smoothing_a * p.bridge_smoothing_a;
   t.floor_smoothing2_m2_s2 = p.floor_smoothing_m_s * p.floor_smoothing_m_s;
-  t.battery_span_v = p.battery_full_v - p.battery_empty_v;
-  t.stribeck_n_m = p.motor_stiction_n_m - p.motor_coulomb_n_m;
-  t.gear_loss_ratio = 1.0 - p.motor_gear_efficiency_ratio;
-  t.per_radius = 1.0 / p.wheel_radius_m;
+  t.per_radius = per_radius;
   t.per_inductance = 1.0 / p.motor_inductance_h;
-  t.per_stribeck = 1.0 / p.motor_stribeck_rad_s;
   t.per_charge = 1.0 / (3600.0 * p.battery_capacity_a_h);
   t.side_inertia_kg_m2 = p.motor_per_side * rotor + (p.castor ? 1.0 : 2.0) * p.wheel_inertia_kg_m2;
-  t.emf_v_s = p.motor_emf_constant_v_s_rad * p.motor_gear_ratio;
-  t.gear_n_m_a = p.motor_torque_constant_n_m_a * p.motor_gear_ratio;
   t.roll_n = 0.5 * p.floor_rolling_ratio * weight_n;
   t.slide_front_n = p.floor_friction_ratio * weight_n * p.rear_axle_m / wheelbase_m;
   t.slide_rear_n = p.floor_friction_ratio * weight_n * p.front_axle_m / wheelbase_m;
@@ -132,7 +132,7 @@ Terms<double> derive(const PlantParams& p) {
     t.slide_rear_n = 0.0;
     t.castor_n = p.castor_friction_ratio * weight_n * castor_ratio;
   }
-  const double rim_kg = 2.0 * t.side_inertia_kg_m2 * t.per_radius * t.per_radius;
+  const double rim_kg = 2.0 * t.side_inertia_kg_m2 * per_radius * per_radius;
   t.per_mass_rim = 1.0 / (p.mass_kg + rim_kg);
   t.per_inertia_rim =
       1.0 / (p.inertia_kg_m2 + p.mass_kg * p.d0_m * p.d0_m + 0.25 * p.track_m * p.track_m * rim_kg);
@@ -164,7 +164,7 @@ double Plant::charge_after(double h_s, const Drive& drive) const {
 
 StateVector Plant::derivative(const StateVector& x, const Drive& drive, const LoadVector& load) const {
   const OneModel<Acts::kAll> model{t_, drive.duty, drive.jam, p_.castor, p_.slip, p_.lifted};
-  return listed(model.derivative(paired(x), {std::cos(x[kTheta]), std::sin(x[kTheta])}, load));
+  return listed(model.derivative(paired(x), direction(x[kTheta]), load));
 }
 
 void Plant::step(double h_s, const Drive& drive, const LoadVector& begin, const LoadVector& middle,
@@ -177,8 +177,7 @@ void Plant::advance(double h_s, const Drive& drive, const LoadVector& begin, con
                     const LoadVector& end) {
   rest_.holds = false;
   const OneModel<kActs> model{t_, drive.duty, drive.jam, p_.castor, p_.slip, p_.lifted};
-  x_ = listed(model.advanced(paired(x_), {std::cos(x_[kTheta]), std::sin(x_[kTheta])},
-                             {h_s, 0.5 * h_s, h_s / 6.0}, begin, middle, end));
+  x_ = listed(model.advanced(paired(x_), {h_s, 0.5 * h_s, h_s / 6.0}, begin, middle, end));
 }
 
 // Whether a step with both motors off left everything but the charge as it was, to the bit. The charge acts

@@ -5,14 +5,11 @@
 
 #include <array>
 
+#include "direction.hpp"
 #include "plant_terms.hpp"
 #include "two_lanes.hpp"
 
 namespace twin {
-
-// What one step calls four times: a chain of results that wait for each other, which a call's way
-// through memory makes a tenth longer.
-#define TWIN_INLINE [[gnu::always_inline]] inline
 
 // One list: C++ fields, their Python names, and what a caller must set (no defaults).
 // clang-format off
@@ -153,8 +150,5 @@ class Plant {
   StateVector x_{};
   Rest rest_;
 };
-
-// Cosines and sines of n headings, as a step of one robot takes them.
-void headings(const double* theta_rad, double* cos, double* sin, int n);
 
 }  // namespace twin

@@ -14,6 +14,7 @@ import pytest
 
 import hil
 from hil.record.reader import read_run
+from hil.tools.templates import write_template
 from tests.cli.command import hil as hil_command
 
 POSE = {"camera": "pose", "duration_s": 1.0}
@@ -97,6 +98,27 @@ def test_scenario_object_and_dotted_names() -> None:
     assert (scenario.link.loss_ratio, scenario.start.x_m) == (0.1, 0.5)
     changed = hil.load_scenario(scenario, duration_s=np.float64(2.5))
     assert (changed.duration_s, changed.start.x_m) == (2.5, 0.5)
+
+
+def test_values_that_are_tables_or_any_text() -> None:
+    """What --set takes as TOML is given as Python: lists of tables, NumPy's numbers, any character."""
+    pushes = [{"target": "force_left_n", "shape": "step", "amplitude": np.int64(2), "end_s": None}]
+    scenario = hil.load_scenario(
+        "scenario-1",
+        disturbances=pushes,
+        reference={"kind": "circle", "radius_m": 0.4},
+        requirements=(),
+        name="robot \U0001f916",
+        description='a "quoted" \\ text \x7f',
+    )
+    (push,) = scenario.disturbances
+    assert (push.target, push.amplitude, push.end_s) == ("force_left_n", 2.0, None)
+    assert scenario.reference.kind == "circle"
+    assert scenario.requirements == ()
+    assert scenario.name == "robot \U0001f916"
+    assert scenario.description == 'a "quoted" \\ text \x7f'
+    with pytest.raises(hil.BadInput, match=r"duration_s = nan s: input should be a finite"):
+        hil.load_scenario("scenario-1", duration_s=float("nan"))
 
 
 def test_tables_have_units_and_no_values_where_there_are_none(records: dict[str, hil.Run]) -> None:
@@ -199,7 +221,16 @@ def test_class_of_a_script_is_a_law_that_is_watched() -> None:
         (lambda: hil.run("scenario-9"), "no such file and no built-in scenario"),
         (lambda: hil.run("scenario-1", "pidd"), "near: pid"),
         (lambda: hil.run("scenario-1", int), "decorate it: @hil.outer_law"),
-        (lambda: hil.run("scenario-1", seed=-1), "seed = -1: must be from 0"),
+        (lambda: hil.run("scenario-1", seed=-1), "seed = -1: must be a whole number from 0"),
+        (lambda: hil.run("scenario-1", seed="3"), "seed = '3': must be a whole number"),
+        (lambda: hil.run("scenario-1", seed=2.5), "seed = 2.5: must be a whole number"),
+        (lambda: hil.run("scenario-1", seed=True), "seed = True: must be a whole number"),
+        (lambda: hil.run("scenario-1", camera=0), "camera '0': a simulated robot is seen"),
+        (lambda: hil.run("scenario-1", camera=Path("x.avi")), "camera 'x.avi'"),
+        (lambda: hil.run("scenario-1", camera=1.5), "camera = 1.5"),
+        (lambda: hil.run("scenario-1", duration_s=float("nan")), "duration_s = nan s"),
+        (lambda: hil.run("scenario-1", Path("no_law.py")), "no_law.py cannot be read"),
+        (lambda: hil.run("scenario-1", control__estimator=Path("no.py")), "no.py cannot be read"),
         (lambda: hil.run("scenario-1", inner="lqr"), "the board has none of this name"),
         (lambda: hil.run("scenario-1", on="moon"), "target 'moon': unknown"),
         (lambda: hil.run("scenario-1", robot__mas_kg=3), "near: robot.mass_kg"),
@@ -219,6 +250,42 @@ def test_wrong_input_is_one_line_and_leaves_nothing(
         call()
     assert "\n" not in str(told.value)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_values_of_numpy_pathlib_and_dictionaries_are_those_they_stand_for(tmp_path: Path) -> None:
+    """A table, an array, a tuple in a tuple, a path: the same scenario as with `--set`."""
+    points = [[-0.6, -0.35], [0.0, 0.1], [0.4, -0.35]]
+    task = {"kind": "waypoints", "speed_max_m_s": np.float32(0.125)}
+    found = [
+        hil.load_scenario("scenario-1", reference=task | {"points_m": form}).reference
+        for form in (points, np.array(points), tuple(map(tuple, points)))
+    ]
+    assert found[0] == found[1] == found[2]
+    assert (found[0].speed_max_m_s, len(found[0].points_m)) == (0.125, 3)
+    law, _ = write_template("law", "own-by-path", tmp_path, None)
+    laws = {
+        hil.run("scenario-1", law, np.int64(3), in_memory=True, **POSE).manifest.outer,
+        hil.run("scenario-1", str(law), 3.0, in_memory=True, **POSE).manifest.outer,
+    }
+    assert laws == {"own-by-path"}
+
+
+def test_one_law_is_a_list_of_one(tmp_path: Path) -> None:
+    """`laws="pid"` is not the laws p, i and d."""
+    made = hil.experiment(
+        ["scenario-1"], "pid", out=tmp_path / "e", workers=1, circle=False, **POSE
+    )
+    assert [run.manifest.outer for run in made.runs] == ["pid"]
+
+
+def test_what_is_read_from_a_run_cannot_be_written_to() -> None:
+    """Millimetres made in place would be in the report too."""
+    run = hil.run("scenario-1", in_memory=True, **POSE)
+    with pytest.raises(ValueError, match="read-only"):
+        run.samples["est_x_m"][:] *= 1e3
+    with pytest.raises(ValueError, match="read-only"):
+        run.frames["x_m"][0] = 1.0
+    assert abs(run.table().column("est_x_m")[0].as_py()) < 1.0
 
 
 @hil.outer_law("interrupts")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import stat
 import subprocess
@@ -100,6 +101,23 @@ def test_nothing_outside_the_records_is_reached(console, name):
     assert status == 400
     assert "error" in said
     assert (console.work / "secret" / "manifest.json").is_file()
+
+
+def test_nonsense_is_answered_in_one_line(console):
+    """Brackets without end, a list for a word, numbers beyond all: neither a fault nor a page lost."""
+    deep = b"[" * 50_000
+    with console.page("op") as page:
+        for path, body in (
+            ("/api/delete", deep),
+            ("/api/calibrate", {"step": ["lens"]}),
+            ("/api/calibrate", {"step": "floor", "points": [[math.nan] * 4] * 4}),
+        ):
+            status, said = console.send(path, body, "op")
+            assert status == 400, said
+            assert said["error"].startswith(("not understood", "calibrate: ")), said
+        for text in (deep.decode(), f'{{"do":"step","x_m":1{"0" * 400},"y_m":1}}'):
+            page.socket.send(text)
+            assert "not understood" in page.until("said")[-1]["error"]
 
 
 def test_files_of_the_user_alone_are_named(console):

@@ -10,10 +10,11 @@ import pytest
 
 from hil.console import listing
 from hil.console.choices import describe
-from hil.console.folders import Folders, in_bin, out_of_bin
+from hil.console.folders import Folders, in_bin, out_of_bin, require_closed
 from hil.console.listing import Listing, Wanted
 from hil.console.orders import inside, order_of
 from hil.core.errors import BadInput
+from hil.core.files import hold
 from tests.console.rig import PATIENCE_S, Console
 
 pytestmark = pytest.mark.realtime
@@ -120,6 +121,26 @@ def test_a_record_goes_into_the_bin_and_back(folders):
     for name in ("../good", "none", ".x", "a/b"):
         with pytest.raises(BadInput, match="no record in the bin"):
             out_of_bin(folders.root, name)
+
+
+def test_a_record_that_is_being_written_stays_where_it_is(folders):
+    """Whoever writes it, `hil run` beside the console too, would lose it; one left behind may go."""
+    at_work = record(folders.root, "at work", outcome="running")
+    with (at_work / ".reserve").open("xb") as file:
+        hold(file)
+        with pytest.raises(BadInput, match="at work: its run is on"):
+            require_closed(at_work, "at work")
+    require_closed(at_work, "at work")
+    require_closed(folders.record("good"), "good")
+
+
+def test_a_number_beyond_all_costs_one_record_and_not_the_list(folders):
+    """A manifest of another program may say anything."""
+    place = record(folders.root, "huge")
+    manifest = place / "manifest.json"
+    manifest.write_text(manifest.read_text().replace('"seed": 2', '"seed": 1e999'))
+    found = {item.name: item.verdict for item in Listing(folders).items()}
+    assert (len(found), found["huge"], found["good"]) == (6, "damaged", "held")
 
 
 def test_a_file_is_one_of_the_users_own(folders):

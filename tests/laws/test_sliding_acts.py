@@ -147,6 +147,32 @@ def test_a_set_whose_sliding_mode_acts_holds(scenario):
     assert values["sliding_term_share"] > 0.01
 
 
+def test_the_gain_of_f_plus_counts_as_alpha_does():
+    """With alpha = 0, F+ = 4 (2.9) is alpha = 8 (4.14): the same run, and the same figures of it."""
+    plain = run("scenario-1", gains=ACTS)
+    other = [*ACTS[:2], "alpha_m_s3=0", "gamma0_m_s3=4", *ACTS[3:]]
+    bound = run("scenario-1", gains=other)
+    assert np.array_equal(plain.samples["v1_m_s3"], bound.samples["v1_m_s3"])
+    assert bound.figures().values == pytest.approx(plain.figures().values, nan_ok=True)
+    assert bound.figures().values["sliding_term_share"] > 0.3
+    assert verdict(bound)
+
+
+def test_a_gain_that_varies_counts_by_its_least():
+    """F+ per distance falls as the robot comes near: what is left there has to outweigh the disturbance."""
+    columns = signals(*(4 * [np.cos]), s_x_m_s2=np.zeros(180), s_y_m_s2=np.zeros(180), eps_m_s2=np.ones(180),
+                      delta1_x_m=np.linspace(0.6, 0.1, 180), delta1_y_m=np.zeros(180))  # fmt: skip
+    told = [
+        sliding.figures(columns, "true", LawFacts(alpha, 0.03, 1.0, gammas))["alpha_over_d90_ratio"]
+        for alpha, gammas in (
+            (3.0, (0.5, 10.0, 0.0)),
+            (3.0 + 2.0 * 0.5 + 2.0 * 10.0 * 0.1, (0, 0, 0)),
+        )
+    ]
+    assert told[0] == pytest.approx(told[1])
+    assert told[0] > 0.0
+
+
 def test_a_layer_wider_than_the_acceleration_limit_does_not_act():
     """Negative control: the same gain over a layer of 1.5 m/s^2, more than zeta may be."""
     assert not verdict(run("scenario-3", gains=[*ACTS, "eps_min_m_s2=1.5"]))

@@ -13,6 +13,7 @@ import hil.study.tune_work
 from hil.analysis.stats import paired
 from hil.cli.tune import _cell, command
 from hil.config.gains import Gains
+from hil.config.load import load_scenario
 from hil.core.errors import BadInput
 from hil.core.figures import BY_NAME
 from hil.study.campaign.results import program
@@ -147,6 +148,22 @@ def test_gains_for_a_robot_and_tasks_of_ones_own(tmp_path):
     assert list(document["verdict"]["asg-ism - pid"]) == ["all", "scenario-2"]
     assert document["gains"]["origin"]["robot"] == "heavy"
     assert document["gains"]["origin"]["held_out"].startswith("scenario-2, seeds 1000")
+
+
+def test_a_robot_is_taken_as_a_run_takes_it(tmp_path):
+    """With its board, below what is set besides and below the conditions of a deck."""
+    (tmp_path / "mine.toml").write_text('base = "diff-2wd"\n[board]\nPWM_MAX = 0.8\n')
+    mine, more = str(tmp_path / "mine.toml"), ["robot.mass_kg=3.13", "duration_s=4"]
+    (task,) = load_tasks(["scenario-1"], mine, more).scenarios.values()
+    assert task == load_scenario("scenario-1", [f"robot.file={mine}", *more])
+    assert task.robot.mass_kg == 3.13
+    assert task.board["PWM_MAX"] == pytest.approx(0.8)
+    unseen = load_tasks(["suite"], mine).unseen
+    assert unseen["beside-in-coarse-encoder"].robot.encoder_counts_per_turn == 120
+    assert unseen["beside-in-sagging-battery"].robot.battery.charge_start_ratio == 0.3
+    assert {task.robot.name for task in unseen.values()} == {task.robot.name}
+    with pytest.raises(BadInput, match="both name the robot"):
+        load_tasks(["scenario-1"], mine, ["robot.file=thesis-4wd"])
 
 
 def test_tasks_that_cannot_be_told_apart_are_refused(tmp_path):

@@ -242,3 +242,17 @@ def test_status_and_notes_of_a_verdict(hil: Command) -> None:
     assert "lasts 0.95 s, scenario-1 takes 20 s" in err
     kept = [event.text for event in read_run(Path("run")).events if event.kind == "note"]
     assert len(kept) == 2
+
+
+def test_columns_called_as_in_a_record_need_no_mapping(hil: Command) -> None:
+    """What `hil export --to csv` wrote, or a program that uses its names, is read as it stands."""
+    hil("run", "scenario-1", "--camera", "pose", "--set", "duration_s=0.5", "--out", "run")
+    hil("export", "run", "--to", "csv", "--out", "run.csv")
+    hil("import", "run.csv", "--out", "back")
+    made, back = read_run(Path("run")).samples, read_run(Path("back")).samples
+    for name in ("t_s", "est_x_m", "est_y_m", "est_eta1_m_s", "omega_cmd_left_rad_s", "battery_v"):
+        assert back[name].tobytes() == made[name].tobytes(), name
+    text = Path("run.csv").read_text(encoding="utf-8")
+    Path("other.csv").write_text(text.replace("est_y_m", "y", 1), encoding="utf-8")
+    status, _, said = hil("import", "other.csv", "--out", "none")
+    assert (status, "gives no est_y_m" in said) == (2, True)

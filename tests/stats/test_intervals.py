@@ -102,6 +102,22 @@ def test_groups_of_unequal_size_keep_the_mean() -> None:
     assert by_group(values[:4], [1, 1, 2, 2]).tolist() == [1.5, 6.5]
 
 
+@pytest.mark.parametrize("size", [2, 5, 6, 9, 15, 40, MOST_FOR_BOOTSTRAP])
+def test_an_interval_knows_no_order_and_no_side(size: int) -> None:
+    """Values shuffled have the same interval, negated the mirrored one, shifted and scaled it moves along."""
+    rng = np.random.default_rng(size)
+    values = np.exp(rng.normal(0.0, 0.8, size))
+    found = mean_interval(values)
+    ends = pytest.approx((found.low, found.high), rel=1e-9)
+    for _ in range(3):
+        shuffled = mean_interval(rng.permutation(values))
+        assert (shuffled.low, shuffled.high) == ends
+    mirrored = mean_interval(-rng.permutation(values))
+    assert (-mirrored.high, -mirrored.low) == ends
+    moved = mean_interval(3.0 + 10.0 * rng.permutation(values))
+    assert ((moved.low - 3.0) / 10.0, (moved.high - 3.0) / 10.0) == ends
+
+
 def test_rows_of_a_table_are_samples_of_their_own() -> None:
     """Many samples at once give what each gives alone; equal values give their value."""
     samples = np.random.default_rng(1).exponential(size=(5, 12))

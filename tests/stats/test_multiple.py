@@ -13,11 +13,13 @@ from hil.analysis.stats import paired
 from hil.cli.power import command as power_command
 from hil.core.errors import BadInput
 from hil.study.campaign.plan import Campaign, CampaignFile
+from tests.cli.command import hil
 
 
 def test_pairs_by_the_thousand_need_little_memory():
     """Statistics of 20,000 pairs, seeds given, stay below 40 MB; below 500 pairs too."""
     rng = np.random.default_rng(3)
+    paired([0.0, 1.0, 3.0], [1.0, 1.0, 2.0])  # what is imported at the first call is not counted
     for pairs in (499, 20_000):
         one = rng.normal(size=pairs)
         two = one + rng.normal(0.1, 1.0, pairs)
@@ -183,3 +185,15 @@ def test_campaigns_draw_evenly_where_they_are_asked_to(sampling):
     assert sum(point["camera.latency_s"] < 0.06 for point in draws) == 16
     plain = {int((point["robot.mass_kg"] - 2.0) * 32) for point in drawn_by("random")}
     assert len(plain) < 28
+
+
+@pytest.mark.parametrize(
+    ("difference", "sd", "pairs"), [("-0.1", "1e-300", 2), ("1e300", "1e-3", 2), ("1", "inf", None)]
+)
+def test_power_of_differences_beyond_all_measure(difference, sd, pairs):
+    """A difference of more deviations than SciPy can follow needs two pairs; an sd must be finite."""
+    done = hil("power", "--difference", difference, "--sd", sd, "--json")
+    if pairs is None:
+        assert "sd = inf" in done.refusal
+    else:
+        assert (done.json["pairs"], done.json["power_at_pairs"]) == (pairs, 1.0)

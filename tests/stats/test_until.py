@@ -1,11 +1,13 @@
 """Repeats until an interval is narrow enough: what `hil experiment --until-interval` goes by."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput
+from hil.report.repeats import repeats_of
 from hil.runs.execute import RunSpec, execute_in_memory
 from hil.study.until import Until
 
@@ -36,6 +38,20 @@ def test_it_stops_when_every_difference_is_narrow_and_not_before(records):
 def test_fewer_repeats_than_the_first_look_are_never_enough(records):
     """However narrow the interval of eight pairs is."""
     assert not Until.of("iae_m_s", 10.0, "twin").reached(records[:10], lambda _text: None)
+
+
+def test_a_run_that_ended_early_does_not_count(records):
+    """What is looked at is what the report tells: pairs with a run that was stopped are left out of both."""
+    told = [
+        replace(record, manifest=record.manifest.model_copy(update={"outcome": "fault"}))
+        if record.manifest.seed > 20 and record.manifest.outer == "pid"
+        else record
+        for record in records
+    ]
+    assert repeats_of(told).contrasts[0].results["iae_m_s"].left_out == 4
+    # Of 24 pairs 20 are left, fewer than the first look needs.
+    assert not Until.of("iae_m_s", 10.0, "twin").reached(told, lambda _text: None)
+    assert Until.of("iae_m_s", 10.0, "twin").reached(records, lambda _text: None)
 
 
 def test_parts_grow_by_half_and_share_their_beginning():

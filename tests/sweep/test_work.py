@@ -22,7 +22,7 @@ from hil.study.campaign.plan import Campaign, load_campaign
 from hil.study.campaign.results import ResultStore, program, programs
 from hil.study.campaign.work import Worker, run_campaign
 from hil.study.campaign.workers import Pool, in_processes
-from tests.sweep.deadly import Counts, DiesOnce, always_dies, dies_on_three
+from tests.sweep.deadly import Counts, DiesOnce, always_dies, dies_on_three, looked_through
 
 TEXT = """
 scenario = "scenario-1"
@@ -151,6 +151,13 @@ def test_jobs_in_groups_are_done_side_by_side_in_their_order() -> None:
     alone = in_processes(Counts(), range(3), 1)
     assert sorted(alone) == [(0, 1), (1, 1), (2, 1)]
     assert sorted(in_processes(Counts(), range(3), 1, side_by_side=3)) == [(0, 3), (1, 3), (2, 3)]
+
+
+def test_what_a_worker_holds_after_its_first_job_is_not_looked_through_again() -> None:
+    """Its first job finds nothing put aside, all others do; this process is left alone."""
+    found = list(in_processes(looked_through, range(5), 1))
+    assert len({process for process, _ in found}) == 1
+    assert sorted(aside for _, aside in found) == [False, True, True, True, True]
 
 
 def test_workers_that_die_whatever_the_job_end_the_campaign() -> None:

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hil.config.load import load_scenario
+from hil.config.load import load_scenario, with_overrides
 from hil.core.registries import OUTER_LAWS
+from hil.runs import session
 from hil.runs.execute import execute_in_memory
 from hil.runs.together import execute_together
 from tests.own.starts import law_text, written
@@ -80,6 +81,36 @@ def test_runs_stepped_at_once_are_those_stepped_one_by_one(tmp_path: Path):
     sizes = OUTER_LAWS.get(outer).factory.step.__globals__["SIZES"]
     assert max(sizes) == 6
     assert min(sizes) < 6
+
+
+def test_runs_in_axes_of_their_own_are_stepped_at_once(tmp_path: Path):
+    """As tuning and verdicts draw them: each as by itself in Python, the vectors of its trace too."""
+    note = "        SIZES.append(len(where))\n"
+    outer = law_in(
+        tmp_path,
+        "turned-many",
+        (NOTED, note + NOTED),
+        ("\nclass Gains", "\nSIZES = []\n\n\nclass Gains"),
+        ('"abeam_m_s": abeam}', '"abeam_m_s": abeam, "wish_x": wish_x, "wish_y": wish_y}'),
+        ("trace={", 'trace={"wish_x": ("m/s", "wanted, X"), "wish_y": ("m/s", "wanted, Y"), '),
+    )
+    more = [[f"control.axes_rad={axes}"] for axes in (0.7, -2.0, 0.0, 1.3)]
+    specs = [
+        replace(spec, scenario=with_overrides(spec.scenario, one))
+        for spec, one in zip(specs_of(outer), more, strict=False)
+    ]
+    found = execute_together(specs)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(session, "make_drive", lambda *_: None)
+        alone = [execute_in_memory(spec) for spec in specs]
+    for record, by_hand in zip(found, alone, strict=True):
+        assert differences(record, by_hand) == []
+        assert not np.isnan(record.samples["wish_x"]).any()
+    sizes = OUTER_LAWS.get(outer).factory.step.__globals__["SIZES"]
+    assert max(sizes) == len(specs)
+    straight = execute_in_memory(replace(specs[0], scenario=specs_of(outer)[0].scenario))
+    near = np.max(np.abs(straight.samples["wish_x"] - found[0].samples["wish_x"]))
+    assert near < 1e-3  # the same vector in the axes of the world, whatever the law's own are
 
 
 def test_another_law_at_once_is_seen(tmp_path: Path):

@@ -18,10 +18,13 @@ from hypothesis import strategies as st
 from hil.board.wheel_laws import WHEEL_LAWS
 from hil.config.fit import board_parameters
 from hil.config.load import load_scenario
+from hil.control import _outer, translated
 from hil.control.laws import chain
 from hil.control.laws.making import make_law, make_outer_law
 from hil.core import _native as core_native
 from hil.core.clocks import CameraClock
+from hil.core.registries import OUTER_LAWS
+from hil.core.registry import BUILT_IN
 from hil.record.memory import MemoryRecorder
 from hil.rigs.opening import open_rig
 from hil.runs import session
@@ -30,6 +33,7 @@ from hil.runs.execute import execute_in_memory
 from hil.runs.provenance import make_manifest, used_things
 from hil.runs.session import Session
 from hil.runs.spec import RunSpec
+from hil.study.parts_off import opened_without, parts_of
 from hil.wire.identity import board_hashes
 
 # Each with what it needs besides its kind; they begin after half a second.
@@ -48,12 +52,13 @@ FAULTS = {
     "dead_encoder": 'side = "right"',
     "board_reset": "",
 }
+BUILT_IN_LAWS = [entry.name for entry in OUTER_LAWS.entries() if entry.origin == BUILT_IN]
 CASES = st.fixed_dictionaries(
     {
         "scenario": st.sampled_from(
             ["scenario-1", "scenario-2", "scenario-3", "circle", "figure-eight", "stop-and-go"]
         ),
-        "outer": st.sampled_from(["asg-ism", "pid", "super-twisting", "dob-pid"]),
+        "outer": st.sampled_from(BUILT_IN_LAWS),
         "inner": st.sampled_from(sorted(WHEEL_LAWS)),
         "fault": st.sampled_from(sorted(FAULTS)),
         "loss": st.sampled_from([0.0, 0.05]),
@@ -94,7 +99,7 @@ def spec_of(case):
     return RunSpec(scenario, "twin", camera, case["outer"], case["inner"], case["seed"], Path())
 
 
-def parts_of(spec):
+def session_parts(spec):
     """Return the parts of a session over the twin, recorded in memory."""
     rig = open_rig("twin", spec.scenario, "pose", spec.seed)
     parameters = board_parameters(spec.scenario, spec.inner)
@@ -140,6 +145,7 @@ def in_python(case):
     return run(case, lambda *_: None, REAL_DRIVE)
 
 
+REAL_PYTHON_LAW = _outer.python_law
 REAL, REAL_DRIVE = session.make_pump, session.make_drive
 
 
@@ -170,6 +176,54 @@ def test_all_ways_give_the_same_run(case):
     native = in_native(case)
     assert differences(native, in_python(case)) == []
     assert differences(native, by_ticks(case)) == []
+
+
+def retuned(law, shares):
+    """Return settings by which a law runs with gains of its search box, at these shares of it."""
+    box = OUTER_LAWS.get(law).search
+    gains = {
+        name: least * (most / least) ** share
+        for (name, (least, _, most)), share in zip(box.items(), shares, strict=False)
+    }
+    table = f"control.gains.tuned.{law.replace('-', '_')}"
+    return ["control.gain_set=tuned", *(f"{table}.{name}={gain!r}" for name, gain in gains.items())]
+
+
+@settings(max_examples=14, deadline=None)
+@given(
+    law=st.sampled_from(BUILT_IN_LAWS),
+    shares=st.tuples(*[st.floats(0.3, 0.7)] * 8),
+    axes=st.sampled_from([0.0, -0.4]),
+    seed=st.integers(0, 10_000),
+    data=st.data(),
+)
+def test_a_retuned_law_without_a_part_is_native_too(law, shares, axes, seed, data):
+    """With other gains and a part off, as tuning and ablation make it, a run is the same to the bit."""
+    without = data.draw(st.sampled_from(["", *(p for p in parts_of(law) if p != "observed-z3")]))
+    more = ["duration_s=1.5", f"control.axes_rad={axes}", *retuned(law, shares)]
+    scenario = load_scenario("circle", more)
+    translated_laws = []
+
+    def kept(law_, *rest):
+        translated_laws.append(law_)
+        return REAL_PYTHON_LAW(law_, *rest)
+
+    def record(make_drive):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(_outer, "python_law", kept)
+            patch.setattr(session, "make_drive", make_drive)
+            run_ = opened_without(scenario, law, seed, without)
+            run_.session.run()
+            found = run_.record()
+            run_.close()
+            return found
+
+    drives = []
+    native, by_hand = record(noted(REAL_DRIVE, drives)), record(lambda *_: None)
+    assert drives[0] is not None
+    assert translated_laws == []  # native code asks nobody in Python
+    assert native.manifest.tick_count > 30
+    assert differences(native, by_hand) == []
 
 
 @pytest.mark.parametrize("fault", sorted(FAULTS))
@@ -267,6 +321,7 @@ def test_a_law_asked_in_python_gives_the_same_run(what, more):
     spec = replace(spec_of(ONE), outer="asg-ism-implicit", scenario=scenario)
     drives = []
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(translated, "is_translated", lambda _: False)
         patch.setattr(session, "make_drive", noted(REAL_DRIVE, drives))
         native = execute_in_memory(spec)
         patch.setattr(session, "make_drive", lambda *_: None)
@@ -291,7 +346,7 @@ def test_a_replaced_function_is_called():
 def test_who_steps_a_session_sees_each_tick_of_the_same_run():
     """A caller that steps gets every situation; the run is that which nobody looks at."""
     spec = spec_of(ONE)
-    parts = parts_of(spec)
+    parts = session_parts(spec)
     stepped = Session(
         spec.scenario, parts, board_parameters(spec.scenario, spec.inner), board_hashes
     )
@@ -324,7 +379,7 @@ def test_what_native_code_cannot_do_is_left_to_python(what, more):
 def test_a_session_with_native_parts_is_forgotten_after_its_run():
     """Native parts keep no way back to their session: a campaign would keep every run."""
     spec = spec_of(ONE)
-    parts = parts_of(spec)
+    parts = session_parts(spec)
     ran = Session(spec.scenario, parts, board_parameters(spec.scenario, spec.inner), board_hashes)
     assert ran.run().outcome == "complete"
     kept = [weakref.ref(ran), weakref.ref(parts.rig)]

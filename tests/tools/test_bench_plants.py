@@ -82,7 +82,7 @@ def test_the_port_in_numba_is_the_plant():
 def test_a_port_with_another_motor_is_not_the_plant():
     """With a resistance off by a millionth the states differ by more than that (negative control)."""
     step, p = make_step(OF_FLOATS), numbers_of(ROBOT)
-    p = p._replace(motor_resistance_ohm=p.motor_resistance_ohm * (1.0 + 1e-6))
+    p = p._replace(resistance_ohm=p.resistance_ohm * (1.0 + 1e-6))
     start, after, *_ = native_states()
     state = start
     for _ in range(STEPS):
@@ -102,9 +102,9 @@ def test_counted_numbers_count_and_wait():
 
 
 def test_the_operations_of_a_step():
-    """By hand: six roots and eight quotients a slope, four slopes; one cosine and one sine a step."""
+    """By hand: six roots and two quotients a slope, four slopes; one cosine and one sine a step."""
     kinds, wait = counted(ROBOT, {"root": 1.0})
-    assert (kinds["root"], kinds["quotient"], kinds["sine"]) == (24.0, 32.0, 2.0)
+    assert (kinds["root"], kinds["quotient"], kinds["sine"]) == (24.0, 8.0, 2.0)
     # In each slope a root waits for the slope before it, and no root for another of the same slope.
     assert wait == pytest.approx(4.0)
 

@@ -10,7 +10,7 @@ from hil.cli.ablate import command
 from hil.config.control import ControlConfig
 from hil.config.load import load_scenario
 from hil.control.laws.asg_ism import AsgIsm
-from hil.control.laws.parts import WithoutFeedForward, WithoutGamma, WithoutKappa, replace_block
+from hil.control.laws.parts import WithoutFeedForward, has_block, leave_out
 from hil.core.errors import BadInput
 from hil.core.registries import OUTER_LAWS
 from hil.core.types import ReferenceState
@@ -35,36 +35,35 @@ def test_each_law_has_its_own_parts():
     assert not {"alpha", "kappa", "gamma"} & set(parts_of("pid"))
 
 
-class Block:
-    """A sliding block that says what it was reset to."""
-
-    def terms(self, _t_s, _p, _q):
-        return (1.0, 2.0), [3.0, 4.0], (5.0, 6.0), (7.0, 8.0), (9.0, 9.0)
-
-    def reset(self, p, q):
-        self.started = (list(p), list(q))
-
-    def advance(self, dt_s):
-        return dt_s
-
-
-def test_kappa_and_gamma_are_off_and_the_rest_is_not():
-    """Of equal terms kappa is zero; gamma starts from nothing; other calls pass."""
-    block = Block()
-    off = WithoutKappa(block)
-    assert off.terms(0, 0, 0) == ((1.0, 2.0), [0.0, 0.0], (5.0, 6.0), (7.0, 8.0), (9.0, 9.0))
-    assert off.advance(0.1) == 0.1
-    WithoutGamma(block).reset((1.0, 2.0), (3.0, 4.0))
-    assert block.started == ([0.0, 0.0], [0.0, 0.0])
-
-
-def test_the_real_law_takes_a_block_without_kappa():
-    """kappa(0) = 2 delta3(0)/mu0 off a target at rest is what is left out."""
+def block_without(part=""):
+    """Return the sliding block of the shipped law, started, without a part."""
     control = ControlConfig()
     law = AsgIsm(control.active_gains.of(OUTER_LAWS.get("asg-ism")), control.limits, 0.03)
-    replace_block(law, WithoutKappa)
-    _, kappa, *_ = law._block.terms(0.0, (0.1, 0.0), (0.5, 0.0))
-    assert list(kappa)[:2] == [0.0, 0.0]
+    assert has_block(law)
+    if part:
+        leave_out(law, part)
+    law._block.reset((0.1, 0.2), (0.5, -0.4))
+    return law._block
+
+
+def test_without_kappa_the_rest_is_as_it_was():
+    """Of equal terms kappa alone is zero: s(0) = 0 all the same, and gamma stays."""
+    whole, off = block_without(), block_without("kappa")
+    now = (0.2, (0.1, 0.0), (0.5, 0.3))
+    s, kappa, *rest = whole.terms(*now)
+    assert min(map(abs, kappa)) > 0.1
+    assert off.terms(*now) == (s, (0.0, 0.0), *rest)
+    assert off.eta == whole.eta
+
+
+def test_without_gamma_there_is_a_reaching_phase():
+    """With eta = 0, s(0) = q + mu p, worked out by hand; with gamma it is 0."""
+    started = (0.0, (0.1, 0.2), (0.5, -0.4))
+    mu0_s = ControlConfig().active_gains.of(OUTER_LAWS.get("asg-ism")).mu0_s
+    whole, off = block_without(), block_without("gamma")
+    assert whole.terms(*started)[0] == pytest.approx((0.0, 0.0), abs=1e-12)
+    assert off.terms(*started)[0] == pytest.approx((0.5 + 0.1 / mu0_s, -0.4 + 0.2 / mu0_s))
+    assert off.eta == (0.0, 0.0)
 
 
 def test_without_feed_forward_the_law_sees_a_reference_at_rest():
@@ -95,6 +94,17 @@ def test_nothing_off_is_the_law_itself_and_a_part_off_is_not():
     assert off["iae_m_s"] > 1.5 * whole["iae_m_s"]
     with pytest.raises(BadInput, match="has no part 'alpha' to switch off"):
         opened_without(scenario, "pid", 3, "alpha")
+
+
+def test_without_alpha_there_is_no_sliding_term_whatever_it_is_made_of():
+    """F+ of (2.9) adds to alpha (4.14): with it the part that is off is the whole term."""
+    scenario = load_scenario("ahead", ["duration_s=2", "control.gains.tuned.asg_ism.gamma0_m_s3=4"])
+    off, on = figures_together(
+        [partial(opened_without, scenario, "asg-ism", 3, part) for part in ("alpha", "")]
+    )
+    assert on["sliding_term_share"] > 0.0
+    assert off["sliding_term_share"] == 0.0
+    assert off["iae_m_s"] != on["iae_m_s"]
 
 
 def test_a_part_that_helps_everywhere_is_found_and_one_that_does_nothing_is_not():

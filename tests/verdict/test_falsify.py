@@ -1,6 +1,7 @@
 """The search for a counterexample: margin, box, reduction, and what is kept."""
 
 import json
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -10,9 +11,10 @@ from hil.cli.falsify import command
 from hil.config.deck import load_deck
 from hil.config.load import load_scenario
 from hil.core.errors import BadInput
+from hil.core.registries import OUTER_LAWS
 from hil.runs.execute import RunSpec, execute_in_memory
 from hil.study.falsify.box import load_box
-from hil.study.falsify.keep import add_to_deck, write_scenario
+from hil.study.falsify.keep import Asked, add_to_deck, write_scenario
 from hil.study.falsify.margin import FURTHEST, OneRun, Outcome, margin_of
 from hil.study.falsify.search import Trial, falsify
 
@@ -208,20 +210,99 @@ def test_what_is_kept_replays_the_run(tmp_path):
     outcome = run((box.at(point), "pid", 5))
     keep = tmp_path / "kept"
     keep.mkdir()
-    file = write_scenario(
-        keep, "ahead", ["duration_s=4"], box, Trial(tuple(point), outcome), "pid", 5, None
-    )
+    asked = Asked("pid", 5)
+    file = write_scenario(keep, "ahead", box, Trial(tuple(point), outcome), asked)
     scenario = load_scenario(str(file))
     assert scenario.control.outer == "pid"
     assert scenario.requirements == box.at(point).requirements
     spec = RunSpec(scenario, "twin", scenario.camera_source, "pid", "asg-ism", 5, tmp_path)
     replayed, _ = margin_of(execute_in_memory(spec).verdicts())
     assert replayed == outcome.margin
-    deck = load_deck(str(add_to_deck(keep, file, "pid", 5)))
-    assert add_to_deck(keep, file, "pid", 5).read_text().count(file.name) == 1
+    deck = load_deck(str(add_to_deck(keep, file, asked)))
+    assert add_to_deck(keep, file, asked).read_text().count(file.name) == 1
     assert deck.laws == ("pid",)
     (cell,) = deck.cells()
     assert deck.scenario_of(cell).name == scenario.name
+
+
+OVER = {
+    "disturbances": ['disturbances=[{target="force_left_n",shape="step",amplitude=1.0}]'],
+    "a table": ["start={x_m=-0.5,y_m=-0.3,theta_rad=1.0}", 'name="x"', 'description="y"'],
+    "another kind": [
+        'reference={kind="circle",radius_m=0.4,rate_rad_s=0.3}',
+        "requirements=[{metric='iae_m_s',max=0.1}]",
+    ],
+    "nothing off": ["mismatch={}", "robot.mass_kg=3.1", "board.PID_KP=0.02"],
+    "faults": [
+        'faults=[{kind="motor_weak",side="left",start_s=1.0}]',
+        "control.estimator=camera-only",
+    ],
+}
+
+
+@pytest.mark.parametrize("overrides", OVER.values(), ids=OVER)
+def test_what_was_set_for_the_search_is_in_what_is_kept(tmp_path, overrides):
+    """Whatever --set changed, with values or tables, the kept file is the scenario that failed."""
+    box = load_box(str(box_file(tmp_path)), load_scenario("ahead", overrides))
+    point = (1.0, *box.usual[1:-1], 0.9)
+    file = write_scenario(
+        tmp_path, "ahead", box, Trial(point, Outcome(-0.5, "it fails")), Asked("pid", 5)
+    )
+    kept, wanted = (
+        one.model_dump(mode="json") for one in (load_scenario(str(file)), box.at(point))
+    )
+    for own in ("name", "description", "camera_source"):
+        kept.pop(own), wanted.pop(own)
+    assert kept["control"].pop("outer") == "pid"
+    wanted["control"].pop("outer")
+    believed = {key: 1.0 for key in kept["mismatch"]}
+    assert kept.pop("mismatch") == believed | wanted.pop("mismatch")
+    assert kept == wanted
+
+
+def test_a_law_from_a_file_and_the_wheel_law_are_in_what_is_kept(tmp_path, monkeypatch):
+    """In another process, in another folder, the kept files still name the law and the wheel law."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text(OWN_LAW)
+    (tmp_path / "counterexamples").mkdir()
+    keep, asked = Path("counterexamples"), Asked(OUTER_LAWS.get("mine.py").name, 5, inner="pid")
+    box = box_of(tmp_path)
+    trial = Trial(box.usual, Outcome(-0.5, "it fails"))
+    file = write_scenario(keep, "ahead", box, trial, asked)
+    assert f'control.outer = "{Path("..") / "mine.py"}:mine"' in file.read_text()
+    assert "--seed 5 --inner pid" in file.read_text()
+    deck = add_to_deck(keep, file, asked)
+    assert deck.name == "deck-mine-over-pid-seed5.toml"
+    assert "--seed 5 --inner pid" in deck.read_text()
+    monkeypatch.chdir(tmp_path.parent)
+    assert load_scenario(str(tmp_path / file)).control.outer == "mine"
+    assert load_deck(str(tmp_path / deck)).laws == ("mine",)
+
+
+def test_a_kept_file_is_never_written_over(tmp_path):
+    """With one of two files thrown away the next gets a number of its own."""
+    box = box_of(tmp_path)
+    trial = Trial(box.usual, Outcome(-0.5, "it fails"))
+    first, second = (write_scenario(tmp_path, "ahead", box, trial, Asked("pid", 5)) for _ in "12")
+    first.unlink()
+    assert write_scenario(tmp_path, "ahead", box, trial, Asked("pid", 5)) != second
+
+
+OWN_LAW = """
+import hil
+
+
+@hil.outer_law("mine", summary="Stands still.")
+class Mine:
+    def __init__(self, gains, limits, d0_m):
+        pass
+
+    def reset(self, reference, estimate):
+        pass
+
+    def step(self, reference, estimate, dt_s):
+        return hil.OuterCommand(0.0, 0.0, {})
+"""
 
 
 def box_file(tmp_path):

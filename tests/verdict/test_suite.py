@@ -2,6 +2,7 @@
 
 import json
 import math
+from importlib.resources import files
 
 import pytest
 
@@ -22,8 +23,8 @@ from hil.study.suite import (
     spread_over,
     together,
 )
-from hil.study.tune import Case, Trial
-from hil.study.tune_work import load_tasks
+from hil.study.tune import Case, Plan, Trial
+from hil.study.tune_work import identity_of, load_tasks
 from hil.study.tuning_verdict import judge
 
 
@@ -59,6 +60,24 @@ def test_tune_judges_the_suite_on_its_unseen_half():
     assert not {name for name, *_ in seen} & {name for name, *_ in judged}
     assert not {one[2] for one in seen} & {one[2] for one in judged}
     assert {case.scenario for case in tasks.cases()} == set(tasks.names)
+
+
+def test_a_search_is_another_one_where_what_judges_it_changed(tmp_path):
+    """Runs are kept by the names of their tasks: an unseen condition, or the yardstick's task, made other."""
+    text = files("hil").joinpath("data/decks/suite.toml").read_text(encoding="utf-8")
+    file = tmp_path / "own.toml"
+
+    def identity(deck):
+        file.write_text(deck)
+        tasks = load_tasks([str(file)], None)
+        return identity_of(tasks, Plan(cases=tasks.cases()), "pose", "program")["tasks"]
+
+    unseen = text.replace(
+        '"robot.encoder_counts_per_turn" = 120', '"robot.encoder_counts_per_turn" = 240'
+    )
+    assert unseen != text
+    assert identity(text) == identity(text)
+    assert identity(unseen) != identity(text)
 
 
 def test_tune_refuses_to_judge_on_runs_it_tuned_on():

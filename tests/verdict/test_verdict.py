@@ -147,9 +147,9 @@ def test_short_is_a_fraction_of_the_whole():
 
 
 def test_verdict_from_the_command_line(tmp_path):
-    """Real runs of one law against another, the smallest budget there is; data, report and words."""
+    """Real runs of one law, the smallest budget there is; PID, with which it is compared, comes by itself."""
     out = tmp_path / "verdict.json"
-    asked = ["--outer", "pid", "--outer", "backstepping", "--candidates", "4", "--search-cells", "1",
+    asked = ["--outer", "backstepping", "--candidates", "4", "--search-cells", "1",
              "--search-seed", "1", "--points", "2", "--unseen-cells", "2", "--no-ablation",
              "--ablation-cells", "2", "--workers", "1", "--out", str(out), "--json"]  # fmt: skip
     run = CliRunner().invoke(command, asked, standalone_mode=False, catch_exceptions=False)
@@ -157,6 +157,7 @@ def test_verdict_from_the_command_line(tmp_path):
     assert json.loads(out.read_text()) == document["data"]
     assert out.with_suffix(".html").exists()
     assert document["says"]["first_line"] == words.first_line(document["data"])
+    assert document["data"]["laws"] == ["pid", "backstepping"]
     assert len(document["data"]["fronts"]) == 2
     kept = CliRunner().invoke(command, ["--kept", str(out)], standalone_mode=False)
     assert kept.output.startswith(document["says"]["first_line"])

@@ -66,7 +66,7 @@ class AsgIsmImplicitGains(StageGains):
     colour="#882255",
     trace=TERM,
 )
-class AsgIsmImplicit(StagedLaw):
+class AsgIsmImplicit(StagedLaw[AsgIsmImplicitGains]):
     """The law; one instance runs one robot."""
 
     def _begin(self, delta3: Vec2, state: ChainState) -> None:  # noqa: ARG002 - of all laws

@@ -69,10 +69,15 @@ class TurnedAxes:
         """Return the trace with each pair of terms NAME_x..., NAME_y... in the axes of the world."""
         found = dict(trace)
         for name, other in _pairs(tuple(trace)):
-            x, y = trace[name], trace[other]
+            x, y = float(trace[name]), float(trace[other])  # whatever a law calculates in
             found[name] = self._cos * x - self._sin * y
             found[other] = self._sin * x + self._cos * y
         return found
+
+
+def is_of_a_vector(name: str) -> bool:
+    """Say whether a name of a trace is one that X or Y of a vector has."""
+    return any(f"_{axis}_" in name or name.endswith(f"_{axis}") for axis in "xy")
 
 
 @cache

@@ -39,7 +39,7 @@ class BacksteppingGains(StageGains):
     summary="backstepping alone, the third stage linear",
     colour="#666666",
 )
-class Backstepping(StagedLaw):
+class Backstepping(StagedLaw[BacksteppingGains]):
     """The law; one instance runs one robot."""
 
     def _wish(self, stage: Stage, state: ChainState, dt_s: float) -> Wish:  # noqa: ARG002 - of all laws

@@ -66,7 +66,7 @@ class IntegralSlidingModeGains(StageGains):
     colour="#cc79a7",
     trace=TERM,
 )
-class IntegralSlidingMode(StagedLaw):
+class IntegralSlidingMode(StagedLaw[IntegralSlidingModeGains]):
     """The law; one instance runs one robot."""
 
     def _begin(self, delta3: Vec2, state: ChainState) -> None:  # noqa: ARG002 - of all laws

@@ -1,11 +1,10 @@
-"""Parts of a law switched off, to see what each is worth: wrappers around the law itself.
+"""Parts of a law switched off, to see what each is worth: around the law, or in its sliding block.
 
 None of this is in a run that is not an ablation.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from hil.core.types import ReferenceState
@@ -35,42 +34,11 @@ def _at_rest(reference: ReferenceState) -> ReferenceState:
     return ReferenceState(reference.z1_m, _ZERO, _ZERO, _ZERO)
 
 
-class WithoutKappa:
-    """A sliding block that leaves kappa, the rate of mu (p + eta) + Psi, out of the command."""
-
-    def __init__(self, block: Any) -> None:
-        self._block = block
-
-    def __getattr__(self, name: str) -> Any:
-        """Return whatever else the block has."""
-        return getattr(self._block, name)
-
-    def terms(self, t_s: float, p: Sequence[float], q: Sequence[float]) -> Any:
-        """Return the block's terms with kappa zero."""
-        s, kappa, *rest = self._block.terms(t_s, p, q)
-        return (s, type(kappa)([0.0] * len(kappa)), *rest)
-
-
-class WithoutGamma:
-    """A sliding block that starts with gamma zero: s(0) = delta3(0), so there is a reaching phase."""
-
-    def __init__(self, block: Any) -> None:
-        self._block = block
-
-    def __getattr__(self, name: str) -> Any:
-        """Return whatever else the block has."""
-        return getattr(self._block, name)
-
-    def reset(self, p: Sequence[float], q: Sequence[float]) -> None:
-        """Start anew with eta = -p(0) - mu0 q(0) made zero."""
-        self._block.reset([0.0] * len(p), [0.0] * len(q))
-
-
 def has_block(law: object) -> bool:
     """Say whether a law takes kappa and gamma from a sliding block that it keeps over a start."""
-    return hasattr(law, "gamma_m_s") and hasattr(getattr(law, "_block", None), "terms")
+    return hasattr(law, "gamma_m_s") and hasattr(law, "_block")
 
 
-def replace_block(law: Any, wrapper: type[WithoutKappa | WithoutGamma]) -> None:
-    """Put a wrapper around a law's sliding block, in place."""
-    law._block = wrapper(law._block)
+def leave_out(law: Any, part: str) -> None:
+    """Leave kappa or gamma out of what a law's sliding block says (hil.control.AsgIsm), in place."""
+    setattr(law._block, f"without_{part}", True)

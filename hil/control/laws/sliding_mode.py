@@ -45,7 +45,7 @@ class SlidingModeGains(StageGains):
     colour="#e69f00",
     trace=TERM,
 )
-class SlidingMode(StagedLaw):
+class SlidingMode(StagedLaw[SlidingModeGains]):
     """The law; one instance runs one robot."""
 
     def _wish(self, stage: Stage, state: ChainState, dt_s: float) -> Wish:  # noqa: ARG002 - of all laws

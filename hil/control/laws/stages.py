@@ -6,7 +6,7 @@ World frame, SI. delta_i = z_i - z_i* throughout, powers and signs componentwise
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 from hil.config.base import Section, quantity
 from hil.control.laws.chain import Chain, ChainState, restrict
@@ -44,6 +44,8 @@ class StageGains(StartGains):
     k1_s: float = quantity("1/s", "position error to speed", gt=0, le=100)
     k2_s: float = quantity("1/s", "speed error to acceleration", gt=0, le=100)
 
+
+Own = TypeVar("Own", bound=StageGains)  # the gains of a law made of the first two stages
 
 STAGE_BOX = {"k1_s": (0.2, 1.0, 5.0), "k2_s": (0.5, 2.0, 20.0)}
 
@@ -109,13 +111,13 @@ def backstep(
     return Stage(delta3, (jx_ref - g_ddot[0] - r_dot[0], jy_ref - g_ddot[1] - r_dot[1]))
 
 
-class StagedLaw:
+class StagedLaw(Generic[Own]):
     """A law whose last stage alone is its own: `_wish`, `_advance`, and `_begin` where it keeps something.
 
     The chain, its restrictions and the start are those of every law.
     """
 
-    def __init__(self, gains: Any, limits: OuterLimits, d0_m: float) -> None:
+    def __init__(self, gains: Own, limits: OuterLimits, d0_m: float) -> None:
         self._gains = gains
         self._limits = limits
         self._d0 = d0_m
@@ -140,7 +142,7 @@ class StagedLaw:
         self._advance(state, out, dt_s)
         return OuterCommand(out.eta1, out.w, make_trace(state, out, self._d0) | wish.terms)
 
-    def retune(self, gains: Any) -> None:
+    def retune(self, gains: Own) -> None:
         """Go on with other gains; whatever is integrated stays."""
         self._gains = gains
         self._retuned()

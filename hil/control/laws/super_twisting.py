@@ -56,7 +56,7 @@ class SuperTwistingGains(StageGains):
     colour="#56b4e9",
     trace=TERM,
 )
-class SuperTwisting(StagedLaw):
+class SuperTwisting(StagedLaw[SuperTwistingGains]):
     """The law; one instance runs one robot."""
 
     def _begin(self, delta3: Vec2, state: ChainState) -> None:  # noqa: ARG002 - of all laws

@@ -50,7 +50,12 @@ class AsgIsm : public Law {
   const Vec& eta() const { return eta_; }
   const Vec& averaged() const { return sum_; }  // integral of the sub-gradient
 
-  void reset(const Vec& p, const Vec& q) override {
+  // Parts left out, to see what each is worth: kappa is zero; eta is that of p(0) = q(0) = 0, so that s starts
+  // at q(0) + mu p(0) and has to be reached.
+  bool without_kappa = false, without_gamma = false;
+
+  void reset(const Vec& p0, const Vec& q0) override {
+    const Vec p = without_gamma ? Vec{} : p0, q = without_gamma ? Vec{} : q0;
     sum_ = {};
     for (int i = 0; i < gains_.n; ++i) eta_[i] = -p[i] - gains_.mu0 * q[i];
     last_ = {};
@@ -118,6 +123,7 @@ class AsgIsm : public Law {
           floored ? out.mu * (q[i] + out.dh[i]) : out.mu * (q[i] - pulled + out.dh[i] - out.psi[i]);
       out.eps[i] = std::max(layer, gains_.eps_min[i]);
     }
+    if (without_kappa) out.kappa = {};
     return out;
   }
 

@@ -103,6 +103,8 @@ void bind_asg(nb::module_& m) {
                                   tuple(now.eps, n));
           },
           "t_s"_a, "p"_a, "q"_a)
+      .def_rw("without_kappa", &AsgIsm::without_kappa)
+      .def_rw("without_gamma", &AsgIsm::without_gamma)
       .def_prop_ro("eta", [](const AsgIsm& law) { return tuple(law.eta(), law.dim()); })
       .def_prop_ro("averaged", [](const AsgIsm& law) { return tuple(law.averaged(), law.dim()); });
 }

@@ -17,10 +17,15 @@ class Scope:
     """Translates the body of one function."""
 
     def __init__(
-        self, program: Program, methods: Mapping[str, Signature], names: Iterable[str]
+        self,
+        program: Program,
+        methods: Mapping[str, Signature],
+        names: Iterable[str],
+        members: Mapping[str, str] | None = None,
     ) -> None:
         self._program = program
         self._methods = methods
+        self._members = members or {}  # of the object: their types
         self._known = [set(names)]
         self._made = 0
 
@@ -74,6 +79,13 @@ class Scope:
                 yield from (line.removeprefix(indent) for line in self.block(body, indent + "  "))
                 yield "}"
             case ast.For(
+                target=ast.Tuple(elts=[*targets]),
+                iter=ast.Call(func=ast.Name(id="zip"), args=over, keywords=[strict]),
+            ) if ast.unparse(strict) == "strict=True" and len(targets) == len(over):
+                yield from self._each(node, targets, over, indent)
+            case ast.For(target=ast.Name() as target, iter=ast.Attribute() as one):
+                yield from self._each(node, [target], [one], indent)
+            case ast.For(
                 target=ast.Tuple(elts=[ast.Name(id=one), ast.Name(id=other)]),
                 iter=ast.Call(
                     func=ast.Name(id=pairs),
@@ -81,16 +93,63 @@ class Scope:
                 ),
                 body=body,
             ) if pairs == self._program.pairs:
-                yield f"for (const auto& [{one}, {other}] : k_pairs) {{"
+                yield f"for (const auto& [{one}, {other}] : this->pairs) {{"
                 yield f"  if (!{trace}.has({one}) || !{trace}.has({other})) continue;"
                 yield from (line.removeprefix(indent) for line in self.block(body, indent + "  "))
                 yield "}"
             case _:
                 raise NotUnderstoodError(f"line {node.lineno}: {ast.unparse(node)}")
 
+    def _each(
+        self, loop: ast.For, targets: Sequence[ast.expr], over: Sequence[ast.expr], indent: str
+    ) -> Iterator[str]:
+        """Yield a loop over the entries of tuples, which are those entries themselves."""
+        names = [target.id for target in targets if isinstance(target, ast.Name)]
+        inside = [node for statement in loop.body for node in ast.walk(statement)]
+        leaves = any(isinstance(n, ast.Return | ast.Break | ast.Continue) for n in inside)
+        changed = {n.id for n in inside if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+        if len(names) < len(targets) or leaves or changed & set(names) or loop.orelse:
+            raise NotUnderstoodError(f"line {loop.lineno}: {ast.unparse(loop)}")
+        heads = ", ".join(f"[[maybe_unused]] auto&& {cpp_name(name)}" for name in names)
+        yield f"m::each([&]({heads}) {{"
+        yield from (line.removeprefix(indent) for line in self.block(loop.body, indent + "  "))
+        yield f"}}, {', '.join(map(self.of, over))});"
+
+    def _is_shared(self, value: ast.expr) -> bool:
+        """Say whether a value is a part of the object with a state: another name for it is no copy."""
+        match value:
+            case ast.Attribute(value=ast.Name(id="self"), attr=attr):
+                kind = self._members.get(attr, "")
+                return any(
+                    name in kind.replace("<", " ").replace(",", " ").replace(">", " ").split()
+                    for name in self._program.mutable
+                )
+        return False
+
+    def _assign_shared(self, target: ast.expr, value: ast.expr) -> Iterator[str]:
+        """Yield new names for such a part, or for the entries of a tuple of them."""
+        entries = target.elts if isinstance(target, ast.Tuple) else [target]
+        whole = self.of(value)
+        for place, entry in enumerate(entries):
+            known = isinstance(entry, ast.Name) and any(entry.id in names for names in self._known)
+            if not isinstance(entry, ast.Name) or known:
+                raise NotUnderstoodError(
+                    f"line {target.lineno}: {ast.unparse(target)} for a second name"
+                )
+            self._known[-1].add(entry.id)
+            part = f"m::item<{place}>({whole})" if isinstance(target, ast.Tuple) else whole
+            yield f"[[maybe_unused]] auto& {cpp_name(entry.id)} = {part};"
+
     def _assign(self, target: ast.expr, value: ast.expr) -> Iterator[str]:
+        if self._is_shared(value):
+            yield from self._assign_shared(target, value)
+            return
         if isinstance(target, ast.Tuple):
             if isinstance(value, ast.Tuple) and len(value.elts) == len(target.elts):
+                if any(map(self._is_shared, value.elts)):
+                    raise NotUnderstoodError(
+                        f"line {value.lineno}: {ast.unparse(value)} among others"
+                    )
                 # Python works out every value before it assigns one.
                 made = [self._fresh() for _ in value.elts]
                 for name, element in zip(made, value.elts, strict=True):
@@ -182,12 +241,29 @@ class Scope:
                 return f"({self.of(test)} ? {self.of(body)} : {self.of(orelse)})"
             case ast.List(elts=[one]):
                 return f"m::both({self.of(one)})"
+            case ast.ListComp(elt=one, generators=[loop]):
+                return self._listed(one, loop)
+            case ast.Call(
+                func=ast.Name(id="tuple"), args=[ast.GeneratorExp(elt=one, generators=[loop])]
+            ):
+                return self._listed(one, loop)
             case ast.Dict():
                 return self._trace(node)
             case ast.Call():
                 return self._call(node)
             case _:
                 raise NotUnderstoodError(f"line {node.lineno}: {ast.unparse(node)}")
+
+    def _listed(self, one: ast.expr, loop: ast.comprehension) -> str:
+        """Return so many values as a tuple, made in order; a list of them is not changed afterwards."""
+        match loop:
+            case ast.comprehension(
+                target=ast.Name(id=name),
+                iter=ast.Call(func=ast.Name(id="range"), args=[ast.Constant(value=int() as count)]),
+                ifs=[],
+            ):
+                return f"m::listed<{count}>([&](int {name}) {{ return {self.of(one)}; }})"
+        raise NotUnderstoodError(f"line {one.lineno}: {ast.unparse(one)} {ast.unparse(loop)}")
 
     def _trace(self, node: ast.Dict) -> str:
         text = "Trace{}"
@@ -215,6 +291,8 @@ class Scope:
                 return f"AsgBlock([&] {{ AsgBlock::Gains g; {fields} return g; }}())"
             case ast.Attribute(value=ast.Name(id="self"), attr=attr):
                 return f"this->{attr}({self._arguments(node, self._methods.get(attr))})"
+            case ast.Attribute(value=value, attr="_replace"):
+                return self._replaced(value, node)
             case ast.Attribute():
                 return f"{self.of(node.func)}({self._arguments(node, None)})"
             case ast.Name(id=name) if name in self._program.functions:
@@ -224,14 +302,17 @@ class Scope:
             case ast.Name(id="dict"):
                 return f"Trace({self.of(node.args[0])})"
             case ast.Name(id="replace"):
-                changed = " ".join(f"made.{w.arg} = {self.of(w.value)};" for w in node.keywords)
-                return f"[&] {{ auto made = {self.of(node.args[0])}; {changed} return made; }}()"
+                return self._replaced(node.args[0], node)
             case ast.Name(id="float"):
                 return f"static_cast<double>({self.of(node.args[0])})"
             case ast.Name(id="abs" | "max" | "min" | "len" | "bisect_right" as name):
                 return f"m::{name}({', '.join(map(self.of, node.args))})"
             case _:
                 raise NotUnderstoodError(f"line {node.lineno}: {ast.unparse(node)}")
+
+    def _replaced(self, value: ast.expr, node: ast.Call) -> str:
+        changed = " ".join(f"made.{w.arg} = {self.of(w.value)};" for w in node.keywords)
+        return f"[&] {{ auto made = {self.of(value)}; {changed} return made; }}()"
 
     def _arguments(self, node: ast.Call, signature: Signature | None) -> str:
         values = list(node.args)

@@ -22,7 +22,6 @@ _TYPES = {
     "Cost": "std::string",
     "OuterLaw": "AnyLaw",
     "Vehicle": "BelievedGeometry",
-    "FeedbackGains": "PidGains",
     "control.AsgIsm": "AsgBlock",
 }
 _SCALARS = {"double", "int", "bool"}
@@ -54,6 +53,14 @@ class Signature:
     is_struct: bool = False  # made by {...}
 
 
+@dataclass(frozen=True)
+class Base:
+    """A class that is written out in each that is derived from it, its own type for the variable."""
+
+    node: ast.ClassDef
+    variable: str
+
+
 @dataclass
 class Program:
     """What is known of all modules so far."""
@@ -62,6 +69,10 @@ class Program:
     constants: dict[str, str] = field(default_factory=dict)  # module constants: their types
     owners: dict[str, str] = field(default_factory=dict)  # functions and classes: their namespaces
     mutable: set[str] = field(default_factory=set)  # classes with a state
+    protocols: set[str] = field(
+        default_factory=set
+    )  # types of which a function takes any that fits
+    bases: dict[str, Base] = field(default_factory=dict)  # classes that others are made of
     keys: list[str] = field(default_factory=list)  # of traces
     pairs: str = ""  # the function of a Part that pairs them
 
@@ -118,6 +129,14 @@ def signature_of(node: ast.FunctionDef, *, is_method: bool) -> Signature:
         defaults,
         type_of(node.returns),
     )
+
+
+def is_a_method_call(node: ast.AST) -> str:
+    """Return the method that an expression calls of its own object, "" for any other."""
+    match node:
+        case ast.Call(func=ast.Attribute(value=ast.Name(id="self"), attr=name)):
+            return name
+    return ""
 
 
 def is_static(node: ast.FunctionDef) -> bool:

@@ -9,47 +9,18 @@ from pathlib import Path
 from typing import Any
 
 from hil.core.to_cpp.bodies import Scope
+from hil.core.to_cpp.classes import ClassParts, base_of, whole
 from hil.core.to_cpp.kinds import (
     NotUnderstoodError,
     Part,
     Program,
     Signature,
     cpp_name,
+    is_a_method_call,
     is_static,
     passed,
     signature_of,
-    type_of,
 )
-
-
-class ClassParts:
-    """The fields, constructor and methods of one class."""
-
-    def __init__(self, node: ast.ClassDef, part: Part) -> None:
-        self.node = node
-        given = part.members.get(node.name)
-        functions = [f for f in node.body if isinstance(f, ast.FunctionDef)]
-        wanted = [f for f in functions if not f.name.startswith("__") and f.name not in part.leave]
-        self.bodies = [f for f in wanted if not f.decorator_list or is_static(f)]
-        self.methods = {f.name: signature_of(f, is_method=not is_static(f)) for f in self.bodies}
-        self.init = next((f for f in functions if f.name == "__init__" and given is None), None)
-        self.fields = [
-            (f.target.id, type_of(f.annotation), f.value)
-            for f in node.body
-            if isinstance(f, ast.AnnAssign) and isinstance(f.target, ast.Name)
-        ]
-        self.members = list(given or ())
-        bases = [ast.unparse(base) for base in node.bases]
-        self.is_tuple = "NamedTuple" in bases
-        self.base = next((b for b in bases if b.endswith("Gains")), None)
-        self.has_state = self.init is not None or given is not None
-
-    @property
-    def interface(self) -> str:
-        """Return the interface that it has, "" for none."""
-        if {"reset", "step"} <= set(self.methods):
-            return "OuterLaw"
-        return "Reference" if "at" in self.methods else ""
 
 
 def _is_number(node: ast.expr) -> bool:
@@ -90,6 +61,7 @@ class Translation:
         keys = ", ".join(f'"{key}"' for key in self.program.keys)
         hashes = "\n".join(f'    {{"{part.path}", "{self._hash(part)}"}},' for part in self._parts)
         laws = " ".join(f"X({name}, {gains})" for name, gains in self._laws)
+        names = ", ".join(f'"{name}"' for name, _ in self._laws)
         fields = "\n".join(
             f"template <typename F>\nvoid fields({name}& of, F f) {{\n"
             + "".join(f'  f("{one}", of.{one});\n' for one in names)
@@ -103,7 +75,8 @@ class Translation:
             f"// Calls f(name, field) for each field of what Python fills in.\n{fields}\n\n"
             f"#define OUTER_LAWS(X) {laws}\n\n"
             f"constexpr const char* kTraceKeys[] = {{{keys}}};\n"
-            "static_assert(sizeof(kTraceKeys) / sizeof(*kTraceKeys) == kTraceSize);\n"
+            f"constexpr std::size_t kTraceSize = {len(self.program.keys)};\n"
+            f"constexpr const char* kLaws[] = {{{names}}};\n"
             f"constexpr const char* kSources[][2] = {{\n{hashes}\n}};\n\n"
             "}  // namespace outer\n"
         )
@@ -121,6 +94,7 @@ class Translation:
     def _lines(self, part: Part, tree: ast.Module) -> Iterator[str]:  # noqa: PLR0912 - in the order C++ needs
         space = "in_" + Path(part.path).stem
         yield f"\nnamespace {space} {{  // {part.path}"
+        self._know_protocols(tree)
         yield from self._constants(tree)
         yield from self._paired(part, tree)
         found = {
@@ -130,22 +104,36 @@ class Translation:
         }
         if missing := set(part.names) - set(found):
             raise NotUnderstoodError(f"nothing of the name {', '.join(sorted(missing))}")
+        if twice := found.keys() & self.program.owners.keys():
+            raise NotUnderstoodError(f"the names {', '.join(sorted(twice))} once more")
+        own = {
+            n.id
+            for a in tree.body
+            if isinstance(a, ast.Assign)
+            for n in ast.walk(a.targets[0])
+            if isinstance(n, ast.Name)
+        }
         classes = {}
-        for name, node in found.items():
+        for name in sorted(found, key=part.names.index):
+            node = found[name]
             self.program.owners[name] = f"{space}::"
-            if isinstance(node, ast.ClassDef):
-                classes[name] = self._know_class(node, part)
-            else:
+            if isinstance(node, ast.FunctionDef):
                 self.program.functions[name] = signature_of(node, is_method=False)
+            elif (base := base_of(node, own)) is not None:
+                self.program.bases[name] = base
+                del found[name]
+            else:
+                found[name] = node = whole(node, self.program.bases)
+                classes[name] = self._know_class(node, part)
         for node in found.values():  # the fields of structs come before who uses them
             if isinstance(node, ast.ClassDef) and not classes[node.name].has_state:
                 yield from self._struct(classes[node.name])
         for node in found.values():
             if isinstance(node, ast.FunctionDef):
                 yield self._head(node, self.program.functions[node.name], defaults=True) + ";"
-        for node in found.values():
-            if isinstance(node, ast.ClassDef) and classes[node.name].has_state:
-                yield from self._class(classes[node.name])
+        for parts in classes.values():
+            if parts.has_state:
+                yield from self._class(parts)
         for node in found.values():
             if isinstance(node, ast.FunctionDef):
                 signature = self.program.functions[node.name]
@@ -190,6 +178,11 @@ class Translation:
         if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
             return list(zip(target.elts, value.elts, strict=True))
         return [(target, value)]
+
+    def _know_protocols(self, tree: ast.Module) -> None:
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef) and "Protocol" in map(ast.unparse, node.bases):
+                self.program.protocols.add(node.name)
 
     def _know_class(self, node: ast.ClassDef, part: Part) -> ClassParts:
         found = ClassParts(node, part)
@@ -237,20 +230,27 @@ class Translation:
             yield from self._constructor(parts, parts.init)
         yield from self._methods(parts)
         for member, kind in parts.members:
-            yield f"  {kind} {member}{'{}' if parts.init is None else ''};"
+            yield f"  {kind} {member}{'' if member in parts.started else '{}'};"
+        if self.program.pairs:  # of translated laws; whoever knows more names adds theirs
+            yield "  m::Pairs pairs{std::begin(k_pairs), std::end(k_pairs)};"
         yield "};"
         signature = self.program.functions[name]
         if signature.names == ["gains", "limits", "d0_m"]:
             self._laws.append((name, signature.types[0]))
 
     def _constructor(self, parts: ClassParts, init: ast.FunctionDef) -> Iterator[str]:
+        """Yield the constructor: members first, then the calls of methods that give values to the rest."""
         signature = self.program.functions[parts.node.name]
         known = dict(zip(signature.names, signature.types, strict=True))
         scope = Scope(self.program, parts.methods, signature.names)
-        starts = []
+        starts, calls = [], []
         for node in init.body:
             if isinstance(node, ast.Expr):
+                if is_a_method_call(node.value):
+                    calls.append(node.value)
                 continue
+            if calls:
+                raise NotUnderstoodError(f"line {node.lineno}: {ast.unparse(node)} after a call")
             pairs: list[tuple[ast.expr, ast.expr | None]]
             if isinstance(node, ast.AnnAssign):
                 pairs = [(node.target, node.value)]
@@ -262,9 +262,34 @@ class Translation:
                 assert isinstance(target, ast.Attribute)
                 assert value is not None
                 parts.members.append((target.attr, self._kind(value, known)))
+                parts.started.add(target.attr)
                 starts.append(f"{target.attr}({scope.of(value)})")
+        first = f"\n      : {', '.join(starts)}" if starts else ""
+        for call in calls:
+            self._given_by(is_a_method_call(call), parts, set())
+        rest = " ".join(f"{scope.of(call)};" for call in calls)
         inside = ", ".join(self._parameters(signature, defaults=True))
-        yield f"  explicit {parts.node.name}({inside})\n      : {', '.join(starts)} {{}}"
+        yield f"  explicit {parts.node.name}({inside}){first} {{ {rest} }}"
+
+    def _given_by(self, method: str, parts: ClassParts, seen: set[str]) -> None:
+        """Add the members that a method of the constructor, and those it calls, give their first values."""
+        if method in seen or method not in parts.methods:
+            return
+        seen.add(method)
+        (body,) = (f for f in parts.bodies if f.name == method)
+        signature = parts.methods[method]
+        known = dict(zip(signature.names, signature.types, strict=True))
+        for node in ast.walk(body):
+            self._given_by(is_a_method_call(node), parts, seen)
+            if not isinstance(node, ast.Assign):
+                continue
+            for target in node.targets:
+                for one, value in self._pairs(ast.Assign([target], node.value)):
+                    match one:
+                        case ast.Attribute(value=ast.Name(id="self"), attr=attr) if (
+                            attr not in dict(parts.members)
+                        ):
+                            parts.members.append((attr, self._kind(value, known)))
 
     def _kind(self, value: ast.expr, known: Mapping[str, str]) -> str:  # noqa: PLR0911 - one a kind of node
         """Return the type of a value that a constructor keeps."""
@@ -273,8 +298,11 @@ class Translation:
                 return "bool"
             case ast.Constant(value=float()):
                 return "double"
-            case ast.Tuple(elts=[_, _]):
-                return "Vec2"
+            case ast.Tuple(elts=[*elts]):
+                kinds = [self._kind(one, known) for one in elts]
+                return "Vec2" if kinds == ["double"] * 2 else f"std::tuple<{', '.join(kinds)}>"
+            case ast.Call(func=ast.Attribute(value=ast.Name(id="control"), attr="AsgIsm")):
+                return "AsgBlock"
             case ast.Dict():
                 return "Trace"
             case ast.Name(id=name):
@@ -298,14 +326,19 @@ class Translation:
             head = self._head(node, signature, defaults=True)
             ends = " override" if parts.interface and node.name in ("reset", "step", "at") else ""
             yield f"  {'static ' if is_static(node) else ''}{head}{ends} {{"
-            yield from Scope(self.program, parts.methods, signature.names).block(node.body, "    ")
+            scope = Scope(self.program, parts.methods, signature.names, dict(parts.members))
+            yield from scope.block(node.body, "    ")
             yield "  }"
 
     def _head(self, node: ast.FunctionDef, signature: Signature, *, defaults: bool) -> str:
         inside = ", ".join(self._parameters(signature, defaults=defaults))
         # A function of a header, but for methods, which are in their class.
         before = "" if node.args.args[:1] and node.args.args[0].arg == "self" else "inline "
-        return f"{'' if is_static(node) else before}{signature.returns} {node.name}({inside})"
+        kinds = [kind for kind in signature.types if kind in self.program.protocols]
+        any_of = f"template <{', '.join(f'typename {kind}' for kind in kinds)}>\n" if kinds else ""
+        return (
+            f"{any_of}{'' if is_static(node) else before}{signature.returns} {node.name}({inside})"
+        )
 
     def _parameters(self, signature: Signature, *, defaults: bool) -> Iterator[str]:
         scope = Scope(self.program, {}, ())

@@ -2,99 +2,126 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hil.config.load import parse_value
+from hil.config.load import load_scenario
 from hil.core.errors import BadInput
 from hil.core.files import read_toml, replace_file
+from hil.core.registries import OUTER_LAWS
+from hil.core.registry import is_file_name
+from hil.core.toml_text import toml_key, toml_value
 from hil.study.falsify.box import Box
 from hil.study.falsify.search import Trial
 
-_PLAIN = re.compile(r"[A-Za-z0-9_-]+")
+USUAL_INNER = "asg-ism"
+# What the file says of itself, and not of the run's conditions.
+_OWN = ("name", "description", "camera_source")
 
 
-def write_scenario(
-    folder: Path,
-    base: str,
-    overrides: Sequence[str],
-    box: Box,
-    trial: Trial,
-    law: str,
-    seed: int,
-    against: str | None,
-) -> Path:
-    """Write a counterexample as a scenario that lies on the one it departs from; return its file.
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What runs a counterexample was found with, by the names of the laws."""
 
-    `overrides` are the values that were set on top of that one.
-    """
-    base = os.path.relpath(base, folder) if base.endswith(".toml") else base
-    number = 1 + len(list(folder.glob(f"{box.scenario.name}-{_word(law)}-*.toml")))
-    path = folder / f"{box.scenario.name}-{_word(law)}-{number}.toml"
-    replace_file(
-        path, scenario_text(path.stem, base, overrides, box, trial, law, seed, against).encode()
-    )
+    law: str
+    seed: int
+    inner: str = USUAL_INNER
+    against: str | None = None
+
+    @property
+    def over(self) -> str:
+        """Return the option that names the wheel law, where it is not the usual one."""
+        return "" if self.inner == USUAL_INNER else f" --inner {self.inner}"
+
+    def law_from(self, folder: Path) -> str:
+        """Return the law's name as a file in `folder` has to give it: FILE.py:NAME of one from a file."""
+        origin = OUTER_LAWS.get(self.law).origin
+        return f"{os.path.relpath(origin, folder)}:{self.law}" if is_file_name(origin) else self.law
+
+
+def write_scenario(folder: Path, base: str, box: Box, trial: Trial, asked: Asked) -> Path:
+    """Write a counterexample as a scenario that lies on `base`, from which it departs; return its file."""
+    stem = f"{box.scenario.name}-{_word(asked.law)}"
+    taken = [
+        int(found[1])
+        for path in folder.glob(f"{stem}-*.toml")
+        if (found := re.fullmatch(re.escape(stem) + r"-(\d+)", path.stem))
+    ]
+    path = folder / f"{stem}-{1 + max(taken, default=0)}.toml"
+    replace_file(path, scenario_text(path, base, box, trial, asked).encode())
     return path
 
 
-def scenario_text(
-    name: str,
-    base: str,
-    overrides: Sequence[str],
-    box: Box,
-    trial: Trial,
-    law: str,
-    seed: int,
-    against: str | None,
-) -> str:
-    """Return the text of a counterexample's scenario file."""
-    tree = box.tree_at(trial.point)
-    over = f", which {against} meets" if against else ""
+def scenario_text(path: Path, base: str, box: Box, trial: Trial, asked: Asked) -> str:
+    """Return the text of a counterexample's scenario file that is to lie at `path`."""
+    law = asked.law_from(path.parent)
+    over = f", which {asked.against} meets" if asked.against else ""
+    why, margin = trial.outcome.why, -trial.outcome.margin
+    said = toml_value(f"{_word(asked.law)} violates {why} here, by {margin:.2g}")
     lines = [
-        f"# A counterexample of `hil falsify`: {trial.outcome.why}{over}.",
-        f"# hil run THIS_FILE --outer {law} --camera pose --seed {seed}",
-        f"base = {_text(base)}",
-        f"name = {_text(name)}",
-        f"description = {_text(f'{law} violates {trial.outcome.why} here, by {-trial.outcome.margin:.2g}')}",
+        f"# A counterexample of `hil falsify`: {_one_line(why)}{over}.",
+        f"# hil run THIS_FILE --camera pose --seed {asked.seed}{asked.over}",
+        f"base = {toml_value(os.path.relpath(base, path.parent) if base.endswith('.toml') else base)}",
+        f"name = {toml_value(path.stem)}",
+        f"description = {said}",
         'camera_source = "pose"',
-        f"control.outer = {_text(law)}",
+        f"control.outer = {toml_value(law)}",
     ]
-    axes = {axis.key: axis for axis in box.axes}
-    departures = box.departures(trial.point)
-    for text in overrides:
-        key, _, given = (part.strip() for part in text.partition("="))
-        if key not in departures:
-            lines.append(f"{_dotted(key)} = {_value(parse_value(given))}  # set for the search")
-    for key, value in departures.items():
-        if axes[key].push is None:
-            lines.append(f"{_dotted(key)} = {value!r}  # usual: {axes[key].usual:g}")
-    usual = box.scenario.model_dump(mode="json")["requirements"]
-    for table, rows in (
-        ("requirements", tree["requirements"] if tree["requirements"] != usual else ()),
-        ("disturbances", tree["disturbances"]),
-    ):
-        for row in rows:
-            lines += ["", f"[[{table}]]"]
-            lines += [f"{k} = {_value(v)}" for k, v in row.items() if v is not None]
-    return "\n".join(lines) + "\n"
+    usual = {axis.key: axis.usual for axis in box.axes}
+    tables: list[str] = []
+    wanted = {k: v for k, v in box.tree_at(trial.point).items() if k not in _OWN}
+    wanted["control"] = {k: v for k, v in wanted["control"].items() if k != "outer"}
+    for parts, value in _differences(load_scenario(base).model_dump(mode="json"), wanted):
+        if len(parts) == 1 and value and isinstance(value, list) and isinstance(value[0], dict):
+            tables += _rows(parts[0], value)
+            continue
+        dotted = ".".join(parts)
+        told = f"usual: {usual[dotted]:g}" if dotted in usual else "set for the search"
+        lines.append(f"{toml_key(*parts)} = {toml_value(value)}  # {told}")
+    return "\n".join([*lines, *tables]) + "\n"
 
 
-def add_to_deck(folder: Path, scenario: Path, law: str, seed: int) -> Path:
-    """Enter a scenario in the deck of its law and seed, made where needed; return the deck's file."""
-    path = folder / f"deck-{_word(law)}-seed{seed}.toml"
+def _differences(
+    usual: Mapping[str, Any], wanted: Mapping[str, Any], above: tuple[str, ...] = ()
+) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Yield what has to be said on top of one tree to come to another: the parts of a key, its value."""
+    for key, value in wanted.items():
+        parts, old = (*above, key), usual.get(key)
+        if value == old or value is None:
+            continue
+        if isinstance(value, dict) and value:
+            # A table of another kind takes the place of the one below, with all that it holds.
+            same_kind = isinstance(old, dict) and value.get("kind") == old.get("kind")
+            yield from _differences(old if same_kind and old else {}, value, parts)
+        else:
+            yield parts, value
+    if above == ("mismatch",):  # what is no longer off is as believed
+        yield from (((*above, key), 1.0) for key in usual if key not in wanted)
+
+
+def _rows(name: str, rows: list[dict[str, Any]]) -> Iterator[str]:
+    for row in rows:
+        yield from ("", f"[[{name}]]")
+        yield from (f"{toml_key(k)} = {toml_value(v)}" for k, v in row.items() if v is not None)
+
+
+def add_to_deck(folder: Path, scenario: Path, asked: Asked) -> Path:
+    """Enter a scenario in the deck of its laws and seed, made where needed; return the deck's file."""
+    over = "" if asked.inner == USUAL_INNER else f"-over-{asked.inner}"
+    path = folder / f"deck-{_word(asked.law)}{over}-seed{asked.seed}.toml"
     names = list(read_toml(path)["scenarios"]) if path.exists() else []
     names = list(dict.fromkeys([*(Path(name).name for name in names), scenario.name]))
     lines = [
         "# Counterexamples that `hil falsify` found; each fails until it is mended:",
-        f"# hil experiment THIS_FILE --camera pose --seed {seed}",
+        f"# hil experiment THIS_FILE --camera pose --seed {asked.seed}{asked.over}",
         "scenarios = [",
-        *(f"  {_text(f'./{name}')}," for name in names),
+        *(f"  {toml_value(f'./{name}')}," for name in names),
         "]",
-        f"laws = [{_text(law)}]",
+        f"laws = [{toml_value(asked.law_from(folder))}]",
     ]
     replace_file(path, ("\n".join(lines) + "\n").encode())
     return path
@@ -109,21 +136,8 @@ def claim_folder(folder: Path) -> None:
 
 
 def _word(law: str) -> str:
-    return re.sub(r"[^A-Za-z0-9_-]+", "-", Path(law).stem)
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", law)
 
 
-def _dotted(key: str) -> str:
-    head, _, rest = key.partition(".")
-    if head == "mismatch":
-        return f"mismatch.{_text(rest)}"
-    return ".".join(part if _PLAIN.fullmatch(part) else _text(part) for part in key.split("."))
-
-
-def _text(value: str) -> str:
-    return json.dumps(value, ensure_ascii=False)
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{k} = {_value(v)}" for k, v in value.items()) + " }"
-    return _text(value) if isinstance(value, str) else json.dumps(value)
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

@@ -1,5 +1,6 @@
 // Python module hil.control._outer; meaning and units for Python readers: hil/control/_outer.pyi.
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/unique_ptr.h>
 #include <nanobind/stl/vector.h>
@@ -71,10 +72,27 @@ T taken(nb::handle from) {
 
 nb::object pair(const outer::Vec2& v) { return nb::make_tuple(std::get<0>(v), std::get<1>(v)); }
 
-std::unique_ptr<OuterLaw> law_of(const std::string& name, nb::handle gains, nb::handle limits, double d0_m) {
+// A law on a sliding block is given one that leaves the same parts out; any other has none.
+template <typename Law, typename = void>
+struct Block {
+  static void leave_out(Law&, bool, bool) {}
+};
+template <typename Law>
+struct Block<Law, std::void_t<decltype(&Law::_block)>> {
+  static void leave_out(Law& law, bool kappa, bool gamma) { law._block.leave_out(kappa, gamma); }
+};
+
+template <typename Law, typename Gains>
+std::unique_ptr<OuterLaw> made(nb::handle gains, nb::handle limits, double d0_m, bool kappa, bool gamma) {
+  auto law = std::make_unique<Law>(taken<Gains>(gains), taken<outer::OuterLimits>(limits), d0_m);
+  Block<Law>::leave_out(*law, kappa, gamma);
+  return law;
+}
+
+std::unique_ptr<OuterLaw> law_of(const std::string& name, nb::handle gains, nb::handle limits, double d0_m,
+                                 bool kappa, bool gamma) {
 #define X(Law, Gains) \
-  if (name == #Law)   \
-    return std::make_unique<outer::Law>(taken<outer::Gains>(gains), taken<outer::OuterLimits>(limits), d0_m);
+  if (name == #Law) return made<outer::Law, outer::Gains>(gains, limits, d0_m, kappa, gamma);
   OUTER_LAWS(X)
 #undef X
   throw nb::key_error(("no law of the class " + name).c_str());
@@ -109,16 +127,19 @@ void bind_laws(nb::module_& m) {
           "reference"_a, "estimate"_a)
       .def(
           "step",
-          [](OuterLaw& law, nb::handle reference, nb::handle estimate, double dt_s) {
+          [](OuterLaw& law, nb::handle reference, nb::handle estimate, double dt_s, const nb::tuple& own) {
             const outer::OuterCommand out =
                 law.step(taken<ReferenceState>(reference), taken<Estimate>(estimate), dt_s);
             nb::dict trace;
             for (std::size_t key = 0; key < outer::kTraceSize; ++key) {
               trace[outer::kTraceKeys[key]] = out.trace.get(key);
             }
+            for (std::size_t i = 0; i < own.size() && outer::kTraceSize + i < outer::kTraceSlots; ++i) {
+              trace[own[i]] = out.trace.get(outer::kTraceSize + i);
+            }
             return nb::make_tuple(out.eta1_m_s, out.theta_dot_rad_s, trace);
           },
-          "reference"_a, "estimate"_a, "dt_s"_a);
+          "reference"_a, "estimate"_a, "dt_s"_a, "own"_a = nb::tuple());
   using Law = std::unique_ptr<OuterLaw>;
   m.def(
       "python_law",
@@ -126,7 +147,12 @@ void bind_laws(nb::module_& m) {
         return std::make_unique<PythonLaw>(law, own);
       },
       "law"_a, "own"_a);
-  m.def("law", &law_of, "name"_a, "gains"_a, "limits"_a, "d0_m"_a);
+  m.def("law", &law_of, "name"_a, "gains"_a, "limits"_a, "d0_m"_a, nb::kw_only(), "without_kappa"_a = false,
+        "without_gamma"_a = false);
+  m.def(
+      "without_feed_forward",
+      [](OuterLaw& law) -> Law { return std::make_unique<outer::WithoutFeedForward>(outer::AnyLaw{&law}); },
+      nb::keep_alive<0, 1>(), "law"_a);
   m.def(
       "hold_at_goal",
       [](OuterLaw& law, double enter_m, double leave_m) -> Law {
@@ -152,10 +178,16 @@ void bind_laws(nb::module_& m) {
       nb::keep_alive<0, 1>(), "law"_a, "missing_rad_s"_a.none());
   m.def(
       "turned_axes",
-      [](OuterLaw& law, double angle_rad) -> Law {
-        return std::make_unique<outer::TurnedAxes>(outer::AnyLaw{&law}, angle_rad);
+      [](OuterLaw& law, double angle_rad, const outer::m::Pairs& more) -> Law {
+        for (const auto& [x, y] : more) {
+          if (x >= outer::kTraceSlots || y >= outer::kTraceSlots)
+            throw nb::value_error("no place of a trace");
+        }
+        auto out = std::make_unique<outer::TurnedAxes>(outer::AnyLaw{&law}, angle_rad);
+        out->pairs.insert(out->pairs.end(), more.begin(), more.end());
+        return out;
       },
-      nb::keep_alive<0, 1>(), "law"_a, "angle_rad"_a);
+      nb::keep_alive<0, 1>(), "law"_a, "angle_rad"_a, "more"_a);
   m.def(
       "let_go",
       [](OuterLaw& law, nb::handle geometry, nb::handle least_rad_s) -> Law {
@@ -212,10 +244,12 @@ NB_MODULE(_outer, m) {
         }
       },
       nullptr);
-  nb::list names, sources;
+  nb::list names, laws, sources;
   for (const char* key : outer::kTraceKeys) names.append(key);
   for (const auto& [path, hash] : outer::kSources) sources.append(nb::make_tuple(path, hash));
+  for (const char* law : outer::kLaws) laws.append(law);
   m.attr("TRACE_KEYS") = nb::tuple(names);
+  m.attr("LAWS") = nb::tuple(laws);
   m.attr("OWN_TERMS_MOST") = static_cast<int>(outer::kTraceSlots - outer::kTraceSize);
   m.attr("SOURCES") = nb::tuple(sources);
   bind_laws(m);

@@ -32,6 +32,7 @@ class PythonError : public std::runtime_error {
 namespace m {
 
 struct None {};
+using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;  // places in a trace
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double inf = std::numeric_limits<double>::infinity();
@@ -54,6 +55,13 @@ inline double power(double x, double y) {
 }
 inline double cos(double x) { return std::cos(in_domain(x, !std::isinf(x))); }
 inline double sin(double x) { return std::sin(in_domain(x, !std::isinf(x))); }
+// Where the library's result has no bound or is no number though `x` has one and is.
+inline double in_range(double out, double x) {
+  if (std::isinf(out) && std::isfinite(x)) throw PythonError(PythonError::kOverflow, "math range error");
+  return out;
+}
+inline double exp(double x) { return in_range(std::exp(x), x); }
+inline double expm1(double x) { return in_range(std::expm1(x), x); }
 inline double sqrt(double x) { return std::sqrt(in_domain(x, !(x < 0.0))); }
 inline double hypot(double a, double b) { return core::hypot(a, b); }
 inline double copysign(double a, double b) { return std::copysign(a, b); }
@@ -96,6 +104,10 @@ template <std::size_t I, typename... T>
 const auto& item(const std::tuple<T...>& of) {
   return std::get<I>(of);
 }
+template <std::size_t I, typename... T>
+auto& item(std::tuple<T...>& of) {
+  return std::get<I>(of);
+}
 template <std::size_t I, typename T>
 const T& item(const std::vector<T>& of) {
   return of.at(I);
@@ -103,6 +115,37 @@ const T& item(const std::vector<T>& of) {
 template <std::size_t I, typename Struct>
 auto item(const Struct& of) -> decltype(item_of(of, Place<I>{})) {
   return item_of(of, Place<I>{});
+}
+
+inline double element(const Vec2& of, int i) {
+  if (i != 0 && i != 1) throw std::out_of_range("tuple index out of range");
+  return i == 0 ? std::get<0>(of) : std::get<1>(of);
+}
+
+// What `of` makes of 0, 1, ..., in that order.
+template <typename Of, int... I>
+auto listed_of(Of of, std::integer_sequence<int, I...>) {
+  return std::tuple<decltype(of(I))...>{of(I)...};
+}
+template <int N, typename Of>
+auto listed(Of of) {
+  return listed_of(of, std::make_integer_sequence<int, N>());
+}
+
+// Calls `to` with the first entries of tuples of one length, then with the second ones, ...
+template <std::size_t I, typename To, typename... Tuples>
+void at_each(To& to, Tuples&... of) {
+  to(std::get<I>(of)...);
+}
+template <typename To, std::size_t... I, typename... Tuples>
+void all_of(To& to, std::index_sequence<I...>, Tuples&... of) {
+  (at_each<I>(to, of...), ...);
+}
+template <typename To, typename First, typename... Rest>
+void each(To to, First&& first, Rest&&... rest) {
+  constexpr std::size_t n = std::tuple_size_v<std::decay_t<First>>;
+  static_assert(((std::tuple_size_v<std::decay_t<Rest>> == n) && ...), "zip of tuples of other lengths");
+  all_of(to, std::make_index_sequence<n>(), first, rest...);
 }
 
 inline std::array<double, 2> both(double x) { return {x, x}; }
@@ -139,8 +182,7 @@ bool is_none(const Opt<T>& value) {
 }
 }  // namespace m
 
-constexpr std::size_t kTraceSize = 14;   // names of a law's trace, in all translated laws
-constexpr std::size_t kTraceSlots = 32;  // with those of a law of somebody's own behind them
+constexpr std::size_t kTraceSlots = 36;  // names of translated laws, those of somebody's own behind them
 
 // A law's trace: for each of kTraceKeys, and of the names of its own, a number or nothing.
 class Trace {
@@ -151,9 +193,9 @@ class Trace {
   }
   void set(std::size_t key, double value) {
     values_[key] = value;
-    has_ |= 1U << key;
+    has_ |= std::uint64_t{1} << key;
   }
-  bool has(std::size_t key) const { return (has_ >> key & 1U) != 0; }
+  bool has(std::size_t key) const { return (has_ >> key & 1) != 0; }
   // The value by that key, NaN for none.
   double get(std::size_t key) const { return has(key) ? values_[key] : m::nan; }
   friend Trace operator|(Trace a, const Trace& b) {  // of both, that of b
@@ -166,7 +208,7 @@ class Trace {
 
  private:
   std::array<double, kTraceSlots> values_{};
-  std::uint32_t has_ = 0;
+  std::uint64_t has_ = 0;
 };
 
 namespace m {
@@ -181,6 +223,7 @@ class AsgBlock {
     double eps0 = 0.0, beta = 0.5, mu0_s = 1.0, sigma = 1.0;
     bool radial = false;
   };
+  AsgBlock() : AsgBlock(Gains{}) {}
   explicit AsgBlock(const Gains& gains) : law_(native(gains)) {}
 
   void reset(const Vec2& p, const Vec2& q) { law_.reset(vec(p), vec(q)); }
@@ -189,6 +232,10 @@ class AsgBlock {
     return {pair(now.s), pair(now.kappa), pair(now.psi), pair(now.dh), pair(now.eps)};
   }
   void advance(double dt_s) { law_.advance(dt_s); }
+  void leave_out(bool kappa, bool gamma) {
+    law_.without_kappa = kappa;
+    law_.without_gamma = gamma;
+  }
 
  private:
   static control::Vec vec(const Vec2& v) {

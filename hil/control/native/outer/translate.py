@@ -17,6 +17,8 @@ sys.path.insert(0, str(Path(__file__).parents[4]))  # the package need not be in
 from hil.core.to_cpp.kinds import NotUnderstoodError, Part
 from hil.core.to_cpp.modules import Translation
 
+_RETUNE = ("retune", "_retuned")  # gains that change on the way are changed in Python
+
 PARTS = (
     Part("hil/core/types.py", ("Pose", "Estimate", "ReferenceState", "OuterCommand")),
     Part("hil/config/control.py", ("OuterLimits", "CircleReference")),
@@ -26,22 +28,48 @@ PARTS = (
     Part("hil/control/bounds.py", ("disturbance_bound",)),
     Part(
         "hil/control/laws/chain.py",
-        ("ChainState", "ChainCommand", "clip", "damped_inverse", "Chain", "restrict", "authority"),
+        (
+            "ChainState", "ChainCommand", "clip", "damped_inverse", "Chain", "executed_jerk",
+            "restrict", "authority",
+        ),
     ),
     Part("hil/control/laws/trace.py", ("make_trace",)),
-    Part("hil/control/laws/stages.py", ("StartGains", "Stage", "begin", "power", "backstep")),
+    Part(
+        "hil/control/laws/stages.py",
+        (
+            "StartGains", "StageGains", "Stage", "Wish", "begin", "power", "backstep", "StagedLaw",
+            "projected", "sliding_terms",
+        ),
+    ),
     Part(
         "hil/control/laws/state_feedback.py",
         ("PidGains", "StateFeedback", "nested_jerk"),
-        leave=("retune",),
+        leave=_RETUNE,
     ),
+    Part("hil/control/laws/asg_ism.py", ("AsgIsmGains", "is_norm", "_block", "AsgIsm"), leave=_RETUNE),
     Part(
-        "hil/control/laws/asg_ism.py", ("AsgIsmGains", "is_norm", "_block", "AsgIsm"), leave=("retune",)
+        "hil/control/laws/asg_ism_implicit.py",
+        ("AsgIsmImplicitGains", "AsgIsmImplicit"),
+        leave=_RETUNE,
+    ),
+    Part("hil/control/laws/backstepping.py", ("BacksteppingGains", "Backstepping"), leave=_RETUNE),
+    Part("hil/control/laws/dob_pid.py", ("DobPidGains", "Observer", "DobPid"), leave=_RETUNE),
+    Part(
+        "hil/control/laws/integral_sliding_mode.py",
+        ("IntegralSlidingModeGains", "IntegralSlidingMode"),
+        leave=_RETUNE,
+    ),
+    Part("hil/control/laws/sliding_mode.py", ("SlidingModeGains", "SlidingMode"), leave=_RETUNE),
+    Part(
+        "hil/control/laws/super_twisting.py",
+        ("SuperTwistingGains", "SuperTwisting", "twisted"),
+        leave=_RETUNE,
     ),
     Part("hil/control/laws/hold.py", ("HoldAtGoal",)),
     Part("hil/control/laws/within.py", ("WithinWheelSpeed",)),
     Part("hil/control/laws/turn_first.py", ("TurnFirst",)),
     Part("hil/control/laws/let_go.py", ("LetGo",)),
+    Part("hil/control/laws/parts.py", ("WithoutFeedForward", "_at_rest")),
     Part("hil/control/laws/axes.py", ("TurnedAxes",), pairs="_pairs"),
     Part(
         "hil/control/references.py",
