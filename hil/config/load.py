@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from hil.config.fields import told
+from hil.config.explain import clipped, explain
 from hil.config.gain_file import GAIN_SET, fill_gains, lay_gains
 from hil.config.gains import shipped_gains
 from hil.config.limits import board_defaults
@@ -261,7 +261,9 @@ def set_value(tree: Tree, text: str) -> None:
     key, equals, value_text = text.partition("=")
     key = key.strip()
     if not equals:
-        raise BadInput(f"--set {_clip(repr(text))}: needs KEY=VALUE, for example robot.mass_kg=3.1")
+        raise BadInput(
+            f"--set {clipped(repr(text))}: needs KEY=VALUE, for example robot.mass_kg=3.1"
+        )
     put_value(tree, key, parse_value(value_text))
 
 
@@ -284,7 +286,7 @@ def put_value(tree: Tree, key: str, value: Any) -> None:
             name for name in names if name.split(".")[-1] == key.rsplit(".", maxsplit=1)[-1]
         ]
         hint = " or ".join(dict.fromkeys([*same_end[:2], *near])) or f"top level: {', '.join(tree)}"
-        raise BadInput(f"--set {_clip(key)}: no such value; near: {hint}")
+        raise BadInput(f"--set {clipped(key)}: no such value; near: {hint}")
     parent[leaf] = value
 
 
@@ -364,50 +366,4 @@ def build(model: type[Model], tree: Tree, where: str) -> Model:
     try:
         return model.model_validate(tree)
     except ValidationError as error:
-        raise BadInput(f"{where}: {_explain(model, error, tree)}") from None
-
-
-def _explain(model: type[BaseModel], error: ValidationError, tree: Tree) -> str:
-    """Return key, value with unit, and limit of the first violation."""
-    first = error.errors(include_url=False)[0]
-    key = _key(first["loc"], tree)
-    said = first["msg"].removeprefix("Value error, ")
-    limit = said[:1].lower() + said[1:]
-    if first["type"] == "missing":
-        return f"{key}: missing; give a value"
-    value = first["input"]
-    more = error.error_count() - 1
-    rest = f" (and {more} more)" if more else ""
-    if isinstance(value, dict | list):
-        return f"{key}: {limit}{rest}" if key else f"{limit}{rest}"
-    unit = told(model, key, tree).unit
-    if first["type"].startswith(("greater_than", "less_than")):
-        limit = f"{limit} {unit}".strip()
-    return f"{key} = {f'{_short(value)} {unit}'.strip()}: {limit}{rest}"
-
-
-def _short(value: Any) -> str:
-    """Return a value as a message shows it: of a very long one its beginning."""
-    try:
-        text = repr(value)
-    except ValueError:  # an integer of thousands of digits
-        return "a number of thousands of digits"
-    return _clip(text)
-
-
-def _clip(text: str) -> str:
-    return text if len(text) <= 80 else f"{text[:77]}..."
-
-
-def _key(loc: tuple[int | str, ...], tree: Tree) -> str:
-    """Return the dotted name of a violation, without the union tags that the file does not have."""
-    parts: list[str] = []
-    node: Any = tree
-    for part in loc:
-        if isinstance(node, dict) and part not in node and node.get("kind") == part:
-            continue
-        parts.append(str(part))
-        inside = isinstance(node, dict) and part in node
-        inside = inside or (isinstance(node, list) and isinstance(part, int) and part < len(node))
-        node = node[part] if inside else None
-    return ".".join(parts)
+        raise BadInput(f"{where}: {explain(model, error, tree)}") from None
