@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import threading
+from contextlib import AbstractContextManager, nullcontext
 from types import FrameType, TracebackType
 from typing import Any
 
@@ -45,30 +46,13 @@ class _Alarm:
             _set_handler(_SIGNAL, self._before)
 
 
-class _NoAlarm:
-    """Where no alarm can be had."""
-
-    __slots__ = ()
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        at: TracebackType | None,
-    ) -> None:
-        pass
-
-
 if hasattr(signal, "setitimer"):
     _set_timer = signal.setitimer
     _TIMER, _SIGNAL = int(signal.ITIMER_REAL), int(signal.SIGALRM)  # members of an enum take longer
 
 
-def time_limit(seconds: float) -> _Alarm | _NoAlarm:
+def time_limit(seconds: float) -> AbstractContextManager[None]:
     """Raise TooLongError in the body after `seconds`, where the system can (main thread, not Windows)."""
     if not hasattr(signal, "setitimer") or threading.current_thread() is not _MAIN:
-        return _NoAlarm()
+        return nullcontext()
     return _Alarm(seconds)

@@ -8,7 +8,6 @@ is judged elsewhere (`hil.study.tuning_verdict`).
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -24,6 +23,7 @@ from hil.core.errors import BadInput
 from hil.core.files import replace_file
 from hil.core.registries import OUTER_LAWS
 from hil.core.registry import Box
+from hil.core.toml_text import toml_value
 from hil.core.types import wrap_pi
 from hil.study.directions import in_drawn_axes
 
@@ -299,13 +299,7 @@ def write_gain_set(path: Path, gains: Gains) -> None:
     ]
     for table, values in gains.model_dump().items():
         lines += ["", f"[{table}]"]
-        lines += [
-            f"{key} = {json.dumps(value, ensure_ascii=False)}"
-            if isinstance(value, str)
-            else f"{key} = {value!r}"
-            for key, value in values.items()
-            if value is not None
-        ]
+        lines += [f"{k} = {toml_value(value)}" for k, value in values.items() if value is not None]
     replace_file(path, ("\n".join(lines) + "\n").encode())
 
 

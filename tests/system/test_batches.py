@@ -62,15 +62,16 @@ def _gain(outer):
     return [f"control.gains.tuned.{outer.replace('-', '_')}.speed_s=0.7"]
 
 
+def _counting(tmp_path, name, *more):
+    """Return a law of the template that keeps in SIZES for how many runs it was asked at once."""
+    note = "        SIZES.append(len(where))\n"
+    begun = ("\nclass Gains", "\nSIZES = []\n\n\nclass Gains")
+    return law_in(tmp_path, name, (NOTED, note + NOTED), begun, *more)
+
+
 def test_runs_stepped_at_once_are_those_stepped_one_by_one(tmp_path: Path):
     """Ends, holds and gains of their own included; among others that know nothing of it."""
-    note = "        SIZES.append(len(where))\n"
-    outer = law_in(
-        tmp_path,
-        "exact-many",
-        (NOTED, note + NOTED),
-        ("\nclass Gains", "\nSIZES = []\n\n\nclass Gains"),
-    )
+    outer = _counting(tmp_path, "exact-many")
     specs = [*specs_of(outer), spec_of(ONE | {"outer": "pid"}), spec_of(ONE | {"outer": "dob-pid"})]
     found = execute_together(specs)
     for spec, record in zip(specs, found, strict=True):
@@ -85,12 +86,9 @@ def test_runs_stepped_at_once_are_those_stepped_one_by_one(tmp_path: Path):
 
 def test_runs_in_axes_of_their_own_are_stepped_at_once(tmp_path: Path):
     """As tuning and verdicts draw them: each as by itself in Python, the vectors of its trace too."""
-    note = "        SIZES.append(len(where))\n"
-    outer = law_in(
+    outer = _counting(
         tmp_path,
         "turned-many",
-        (NOTED, note + NOTED),
-        ("\nclass Gains", "\nSIZES = []\n\n\nclass Gains"),
         ('"abeam_m_s": abeam}', '"abeam_m_s": abeam, "wish_x": wish_x, "wish_y": wish_y}'),
         ("trace={", 'trace={"wish_x": ("m/s", "wanted, X"), "wish_y": ("m/s", "wanted, Y"), '),
     )
